@@ -1,0 +1,57 @@
+"""A channel's messages as columns: what ingestors hand to storage, and what storage hands back."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .definition import MessageType
+
+Time = NDArray[np.int64]
+"""Integer nanoseconds, shape (n,)."""
+Table = NDArray[np.void]
+"""Structured array, shape (n,)."""
+
+
+@dataclass(frozen=True)
+class Channel:
+    """A topic with its type. ``texts`` holds the strings that every message repeats, by dotted path."""
+
+    topic: str
+    type: MessageType
+    metadata: Mapping[str, str] = field(default_factory=dict)
+    texts: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Columns:
+    """The messages of one channel.
+
+    ``time_ns`` (n,) is log time, publish time and header stamp at once; it need not be sorted. ``data`` (n,) is a
+    structured array with any of the type's top-level fields under their ROS names; a missing header is made from
+    ``time_ns`` and the channel's texts, other missing fields are zero.
+    """
+
+    channel: Channel
+    time_ns: Time
+    data: Table
+
+    def __post_init__(self) -> None:
+        if self.time_ns.shape != self.data.shape:
+            raise ValueError(f"{self.channel.topic}: {self.time_ns.shape} stamps for {self.data.shape} messages")
+
+    def __len__(self) -> int:
+        return len(self.time_ns)
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        return self.data[name]
+
+    def select(self, index: Any) -> "Columns":
+        """The messages that ``index`` (a slice, a mask or positions) picks."""
+        return replace(self, time_ns=self.time_ns[index], data=self.data[index])
+
+    def with_metadata(self, **entries: str) -> "Columns":
+        """The same messages on a channel that says more about itself."""
+        return replace(self, channel=replace(self.channel, metadata={**self.channel.metadata, **entries}))

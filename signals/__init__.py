@@ -1,0 +1,1 @@
+"""Sampled signals: intervals, gaps, interpolation."""
