@@ -48,7 +48,7 @@ class Source:
     @cached_property
     def sha256(self) -> str:
         """Hexadecimal digest of all bytes."""
-        return hashlib.sha256(memoryview(self.data)).hexdigest()
+        return hashlib.sha256(self.data.data).hexdigest()
 
 
 @dataclass(frozen=True)
