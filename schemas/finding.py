@@ -48,9 +48,10 @@ class Finding:
 
 @dataclass(frozen=True)
 class Note:
-    """A line of ``/annotations``: who said what, when."""
+    """A line of ``/annotations``: who said what, when, and until when it holds."""
 
     time_ns: int
     severity: Severity
     name: str
     text: str
+    end_ns: int | None = None

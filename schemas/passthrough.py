@@ -32,7 +32,7 @@ def ros_type_name(name: str) -> str:
 
 
 def ros_field_names(names: Iterable[str]) -> list[str]:
-    """Field names that ROS 2 accepts, distinct: ``TimeUS`` -> ``timeus``, ``2d`` -> ``f2d``, second ``a`` -> ``a_2``."""
+    """Field names that ROS 2 accepts: ``TimeUS`` -> ``timeus``, ``2d`` -> ``f2d``, a second ``a`` -> ``a_2``."""
     taken: set[str] = set(RESERVED)
     result = []
     for name in names:

@@ -1,8 +1,10 @@
 """A log in memory, as estimators and analysis see it: body FLU, world ENU, SI units, integer nanoseconds."""
 
 import dataclasses
+import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +12,14 @@ from numpy.typing import NDArray
 from .columns import Time
 
 Floats = NDArray[np.float64]
+
+
+def content_sha256(time_ns: Time, *values: Floats) -> str:
+    """Digest of a channel's stamps and then its values, as little-endian bytes, whatever file they came from."""
+    digest = hashlib.sha256(np.ascontiguousarray(time_ns, dtype="<i8").data)
+    for array in values:
+        digest.update(np.ascontiguousarray(array, dtype="<f8").data)
+    return digest.hexdigest()
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,6 +32,11 @@ class Imu:
     topic: str = ""
     metadata: Mapping[str, str] = dataclasses.field(default_factory=dict)
 
+    @cached_property
+    def sha256(self) -> str:
+        """`content_sha256` of the samples."""
+        return content_sha256(self.time_ns, self.angular_velocity, self.specific_force)
+
 
 @dataclass(frozen=True, eq=False)
 class Magnetometer:
@@ -31,6 +46,11 @@ class Magnetometer:
     field: Floats
     topic: str = ""
     metadata: Mapping[str, str] = dataclasses.field(default_factory=dict)
+
+    @cached_property
+    def sha256(self) -> str:
+        """`content_sha256` of the samples."""
+        return content_sha256(self.time_ns, self.field)
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,6 +74,11 @@ class Attitude:
     name: str
     topic: str = ""
     metadata: Mapping[str, str] = dataclasses.field(default_factory=dict)
+
+    @cached_property
+    def sha256(self) -> str:
+        """`content_sha256` of the samples."""
+        return content_sha256(self.time_ns, self.orientation)
 
 
 @dataclass(frozen=True)

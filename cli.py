@@ -1,0 +1,285 @@
+"""The command line: one thin function for each verb, which is one call of the package."""
+
+import logging
+import os
+import sys
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+if TYPE_CHECKING:
+    from .pipeline.outcomes import Outcomes
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+EXIT_NOTHING = 1
+EXIT_USAGE = 2
+EXIT_INTERRUPTED = 130
+
+
+def _options(*decorators: Callable[[F], F]) -> Callable[[F], F]:
+    def apply(function: F) -> F:
+        for decorator in reversed(decorators):
+            function = decorator(function)
+        return function
+
+    return apply
+
+
+LOGS = click.argument("logs", nargs=-1, required=True, metavar="LOG...")
+OUTPUT = click.option("-o", "--output", help="File to write, or folder (always a folder for several logs).")
+FORCE = click.option("--force", is_flag=True, help="Replace an output that exists.")
+JOBS = click.option("-j", "--jobs", type=click.IntRange(1), help="Logs handled at once.  [default: all cores]")
+TIMEOUT = click.option(
+    "--timeout", type=click.FloatRange(min=0.1), default=3600.0, help="Seconds for one log of several."
+)
+JSON = click.option("--json", "as_json", is_flag=True, help="Print JSON instead of text.")
+COMMON = _options(OUTPUT, FORCE, JOBS, TIMEOUT, JSON)
+SOURCE = _options(
+    click.option("--vehicle", help="System id whose topics get no prefix, or 'all' to prefix every vehicle's."),
+    click.option("--sensor", help="Profile of a sensor that logs raw counts, such as mpu9250."),
+    click.option("--dialect", default="ardupilotmega", show_default=True, help="MAVLink dialect."),
+    click.option("--compression", type=click.Choice(["zstd", "lz4", "none"]), default="zstd", show_default=True),
+)
+ESTIMATE = _options(
+    click.option(
+        "-e",
+        "--estimator",
+        "estimators",
+        multiple=True,
+        metavar="NAME[:KEY=VALUE,...]",
+        help="Estimator, as in ecf:imu=1,kp=0.5,as=soft; several times.  [default: ecf, ekf9 or ekf6, gyro]",
+    ),
+    click.option("--declination", type=float, help="Degrees, east positive; overrides what the log knows."),
+)
+ANALYZE = _options(
+    click.option(
+        "--reference",
+        help="What to compare with: truth, onboard, or an attitude's name.  [default: truth, else onboard]",
+    ),
+    click.option(
+        "--align",
+        "alignment",
+        type=click.Choice(["none", "yaw", "full"]),
+        help="Constant rotation to remove first.  [default: none; yaw where north is arbitrary]",
+    ),
+    click.option("--start", type=float, help="Seconds from the log's start; earlier samples do not count."),
+    click.option("--end", type=float, help="Seconds from the log's start; later samples do not count."),
+    click.option("--exclude", multiple=True, metavar="FROM:TO", help="Seconds that do not count; several times."),
+)
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+@click.version_option(package_name="attlog")
+@click.option("-v", "--verbose", count=True, help="Say more on stderr (-vv: tracebacks).")
+@click.option("-q", "--quiet", is_flag=True, help="Say nothing on stderr but errors.")
+def cli(verbose: int, quiet: bool) -> None:
+    """Turn flight and IMU logs into one reviewable MCAP, estimate the attitude, and tell how wrong each estimate is.
+
+    Every verb takes files, folders and globs; one bad log stops no other. Exit codes: 0 done, 1 nothing could be done,
+    2 wrong usage, 3 done but for bytes that were skipped or logs that failed, 130 interrupted.
+    """
+    level = logging.ERROR if quiet else (logging.WARNING, logging.INFO, logging.DEBUG)[min(verbose, 2)]
+    logging.basicConfig(level=level, format="%(message)s", stream=sys.stderr)
+
+
+@cli.command()
+@LOGS
+@COMMON
+@SOURCE
+def convert(logs: Sequence[str], jobs: int | None, timeout: float, as_json: bool, **options: Any) -> None:
+    """Turn logs of any format into MCAPs."""
+    from . import pipeline
+
+    options["vehicle"] = _vehicle(options["vehicle"])
+    _show(pipeline.convert(list(logs), jobs=jobs, timeout_s=timeout, **options), as_json)
+
+
+@cli.command()
+@LOGS
+@COMMON
+@ESTIMATE
+def estimate(
+    logs: Sequence[str], jobs: int | None, timeout: float, as_json: bool, estimators: Sequence[str], **options: Any
+) -> None:
+    """Add attitude estimates to MCAPs."""
+    from . import pipeline
+
+    chosen = list(estimators) or None
+    _show(pipeline.estimate(list(logs), chosen, jobs=jobs, timeout_s=timeout, **options), as_json)
+
+
+@cli.command()
+@LOGS
+@COMMON
+@ANALYZE
+@click.option("--parquet", help="Also write the table to this Parquet file.")
+def analyze(
+    logs: Sequence[str],
+    jobs: int | None,
+    timeout: float,
+    as_json: bool,
+    exclude: Sequence[str],
+    parquet: str | None,
+    force: bool,
+    **options: Any,
+) -> None:
+    """Compare every attitude of MCAPs with a reference."""
+    from . import pipeline
+    from .analysis.table import ErrorTable
+
+    spans = [_span(text) for text in exclude]
+    done = pipeline.analyze(list(logs), exclude=spans, jobs=jobs, timeout_s=timeout, force=force, **options)
+    if parquet is not None and done.results:
+        ErrorTable.joined(result.table for result in done.results).to_parquet(parquet, force=force)
+    _show(done, as_json)
+
+
+@cli.command()
+@LOGS
+@COMMON
+@SOURCE
+@ESTIMATE
+@ANALYZE
+def run(
+    logs: Sequence[str],
+    jobs: int | None,
+    timeout: float,
+    as_json: bool,
+    estimators: Sequence[str],
+    exclude: Sequence[str],
+    **options: Any,
+) -> None:
+    """Convert, estimate and analyze in one go."""
+    from . import pipeline
+
+    options["vehicle"] = _vehicle(options["vehicle"])
+    options |= {"estimators": list(estimators) or None, "exclude": [_span(text) for text in exclude]}
+    _show(pipeline.run(list(logs), jobs=jobs, timeout_s=timeout, **options), as_json)
+
+
+@cli.command()
+@LOGS
+@JOBS
+@TIMEOUT
+@JSON
+def info(logs: Sequence[str], jobs: int | None, timeout: float, as_json: bool) -> None:
+    """Tell what is in MCAPs: topics, types, counts, rates, time span, source, completeness."""
+    from . import pipeline
+
+    _show(pipeline.info(list(logs), jobs=jobs, timeout_s=timeout), as_json)
+
+
+@cli.command()
+@click.argument("logs", nargs=-1, required=True, metavar="LOG... [TEXT]")
+@COMMON
+@click.option("--at", help="When: 12.3s or 1m5s after the log's start, or a date such as 2015-06-11T12:13:14Z.")
+@click.option("--to", help="Until when, written as --at.")
+@click.option("--severity", default="info", show_default=True, help="debug, info, warn, error or fatal.")
+@click.option("--notes", help="CSV of notes with the columns at,to,severity,text.")
+@click.option("--remove", multiple=True, type=int, metavar="N", help="Take out note N as listed; several times.")
+@click.option("--list", "list_only", is_flag=True, help="Only list the notes (with numbers).")
+def annotate(
+    logs: Sequence[str],
+    at: str | None,
+    jobs: int | None,
+    timeout: float,
+    as_json: bool,
+    list_only: bool,
+    **options: Any,
+) -> None:
+    """Add a person's notes to MCAPs, list them, or take them out.
+
+    With --at, the last argument is the note's text: attlog annotate flight.mcap --at 12.3s "compass swings here".
+    """
+    from . import pipeline
+
+    files, text = (list(logs), None) if at is None else (list(logs[:-1]), logs[-1])
+    if not files:
+        raise click.UsageError('a note needs a log and a text: attlog annotate FILE --at 12.3s "text"')
+    if list_only and (at is not None or options["notes"] or options["remove"]):
+        raise click.UsageError("--list goes without --at, --notes and --remove")
+    _show(pipeline.annotate(files, text, at=at, jobs=jobs, timeout_s=timeout, **options), as_json)
+
+
+@cli.command()
+@click.argument("scenario")
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
+@click.option("-o", "--output", required=True, help="File to write: .tlog or .mcap.")
+@FORCE
+@JSON
+def simulate(scenario: str, seed: int, output: str, force: bool, as_json: bool) -> None:
+    """Fly a seeded simulation and log it, with truth (attlog list scenarios names them)."""
+    from . import pipeline
+
+    _print(pipeline.simulate(scenario, output, seed=seed, force=force), as_json)
+
+
+@cli.command(name="list")
+@click.argument("what", type=click.Choice(["estimators", "formats", "scenarios"]))
+@JSON
+def list_(what: str, as_json: bool) -> None:
+    """List what there is to choose from."""
+    from .pipeline.listing import listing
+
+    _print(listing(what), as_json)
+
+
+def _vehicle(spelled: str | None) -> Any:
+    if spelled is None or spelled == "all":
+        return spelled
+    if not spelled.isdigit():
+        raise click.UsageError(f"--vehicle takes a system id or 'all', not {spelled!r}")
+    return int(spelled)
+
+
+def _span(spelled: str) -> tuple[float, float]:
+    try:
+        first, last = (float(part.rstrip("s")) for part in spelled.split(":"))
+    except ValueError:
+        raise click.UsageError(f"--exclude takes FROM:TO in seconds, such as 12.5:20, not {spelled!r}") from None
+    return first, last
+
+
+def _print(result: Any, as_json: bool) -> None:
+    import json
+
+    click.echo(json.dumps(result.to_dict(), indent=2) if as_json else result.to_text())
+
+
+def _show(outcomes: "Outcomes[Any]", as_json: bool) -> None:
+    for line in outcomes.errors:
+        click.echo(f"attlog: {line}", err=True)
+    if not outcomes:
+        click.echo("attlog: no log found in what was named", err=True)
+    if as_json:
+        click.echo(outcomes.to_json())
+    elif outcomes.results:
+        click.echo(outcomes.to_text())
+    sys.exit(outcomes.exit_code)
+
+
+def main() -> None:
+    """The program ``attlog``: errors as one line on stderr, and the exit code."""
+    try:
+        cli.main(standalone_mode=False)
+    except (click.exceptions.Abort, KeyboardInterrupt):
+        sys.exit(EXIT_INTERRUPTED)
+    except click.ClickException as error:
+        error.show()
+        sys.exit(EXIT_USAGE)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(EXIT_NOTHING)
+    except Exception as error:
+        sys.exit(_failed(error))
+
+
+def _failed(error: Exception) -> int:
+    """Say the error in one line; the exit code."""
+    from .pipeline.batch import describe
+    from .schemas.errors import UsageError
+
+    click.echo(f"attlog: {describe('attlog', error)}", err=True)
+    return EXIT_USAGE if isinstance(error, UsageError) else EXIT_NOTHING

@@ -1,0 +1,11 @@
+"""The calls behind the verbs of the command line."""
+
+from .analyze import analyze
+from .annotate import annotate
+from .convert import convert
+from .estimate import estimate
+from .info import info
+from .run import run
+from .simulate import simulate
+
+__all__ = ["analyze", "annotate", "convert", "estimate", "info", "run", "simulate"]

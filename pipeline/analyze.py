@@ -1,0 +1,196 @@
+"""How wrong each attitude of a log is, added to its MCAP."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any, overload
+
+from .. import storage
+from ..analysis.channels import error_columns
+from ..analysis.error import AttitudeError, Span, attitude_error
+from ..analysis.table import ErrorTable
+from ..schemas.columns import Columns
+from ..schemas.errors import InputError
+from ..schemas.recording import Attitude, Recording
+from .batch import TIMEOUT_S, run_all
+from .estimate import open_log, read_recordings
+from .inputs import check_target, expand, is_mcap, outputs
+from .outcomes import Outcomes
+from .provenance import software
+
+TRUTH = "truth"
+ONBOARD = "onboard"
+PREFERRED_ONBOARD = ("att", "attitude", "vehicle_attitude")
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """What `analyze` found in one log."""
+
+    source: str
+    output: str
+    table: ErrorTable
+
+    complete = True
+
+    def to_text(self) -> str:
+        """What ``attlog analyze`` prints."""
+        return self.table.to_text()
+
+    def to_dict(self) -> dict[str, Any]:
+        """The same for --json."""
+        return {"output": self.output, "errors": self.table.to_dicts()}
+
+
+@dataclass(frozen=True)
+class AnalysisOptions:
+    """What to compare with what; times are seconds from the log's first message."""
+
+    reference: str | None = None
+    alignment: str | None = None
+    start_s: float | None = None
+    end_s: float | None = None
+    exclude_s: tuple[tuple[float, float], ...] = ()
+
+
+def attitudes(recording: Recording) -> dict[str, Attitude]:
+    """Every attitude by the name that it is scored under; the truth is ``truth``."""
+    named = {TRUTH: recording.reference} if recording.reference is not None else {}
+    named |= {f"{ONBOARD}_{name}": attitude for name, attitude in recording.onboard.items()}
+    return named | dict(recording.estimates)
+
+
+def choose_reference(recording: Recording, wanted: str | None) -> tuple[str, Attitude]:
+    """The attitude that all others are compared with: as ``wanted`` (truth, onboard, or a name), else the truth, else
+    the autopilot's. InputError where the log has no such attitude, or none to compare with at all."""
+    known = attitudes(recording)
+    first = next((f"{ONBOARD}_{name}" for name in PREFERRED_ONBOARD if name in recording.onboard), None)
+    first = first or next((name for name in known if name.startswith(f"{ONBOARD}_")), None)
+    if wanted is None:
+        name = TRUTH if recording.reference is not None else first
+        if name is None:
+            raise InputError("no attitude to compare with: neither a truth nor one of the autopilot's own is logged")
+        return name, known[name]
+    name = first if wanted == ONBOARD and first else wanted if wanted in known else f"{ONBOARD}_{wanted}"
+    if name not in known:
+        raise InputError(f"there is no attitude {wanted!r}; there are: {', '.join(known) or 'none'}")
+    return name, known[name]
+
+
+def errors_of(recording: Recording, options: AnalysisOptions, start_ns: int) -> dict[str, AttitudeError]:
+    """The error of every attitude but the reference, by name."""
+    reference_name, reference = choose_reference(recording, options.reference)
+    span = {
+        "start_ns": _at(options.start_s, start_ns),
+        "end_ns": _at(options.end_s, start_ns),
+        "exclude": _spans(options.exclude_s, start_ns),
+        "alignment": options.alignment,
+    }
+    return {
+        name: attitude_error(attitude, reference, **span)  # type: ignore[arg-type]
+        for name, attitude in attitudes(recording).items()
+        if name != reference_name
+    }
+
+
+def _at(after_s: float | None, start_ns: int) -> int | None:
+    return None if after_s is None else start_ns + round(after_s * 1e9)
+
+
+def _spans(spans: Iterable[tuple[float, float]], start_ns: int) -> tuple[Span, ...]:
+    return tuple((start_ns + round(first * 1e9), start_ns + round(last * 1e9)) for first, last in spans)
+
+
+@dataclass(frozen=True, eq=False)
+class Analyzed:
+    """The errors of one vehicle's attitudes."""
+
+    recording: Recording
+    errors: dict[str, AttitudeError]
+
+    def columns(self) -> list[Columns]:
+        """The errors as channels."""
+        prefix, about = self.recording.prefix, {"software": software()}
+        return [error_columns(e, name=name, prefix=prefix, metadata=about) for name, e in self.errors.items()]
+
+    def table(self, file: str) -> ErrorTable:
+        """The errors as a table, under ``file`` and the vehicle's prefix."""
+        return ErrorTable.from_errors(self.errors, f"{file}{self.recording.prefix}")
+
+
+def analyze_recordings(
+    recordings: Iterable[Recording], options: AnalysisOptions, start_ns: int
+) -> tuple[list[Analyzed], list[str]]:
+    """The errors of every vehicle that has something to compare, and why the others have not."""
+    done: list[Analyzed] = []
+    reasons: list[str] = []
+    for recording in recordings:
+        try:
+            done.append(Analyzed(recording, errors_of(recording, options, start_ns)))
+        except InputError as error:
+            reasons.append(f"{recording.prefix or 'log'}: {error}")
+    return [each for each in done if each.errors], reasons
+
+
+def is_error(topic: str) -> bool:
+    """Whether the topic holds errors, which a new analysis replaces."""
+    parts = topic.split("/")
+    return "error" in parts[1:3]
+
+
+def analyze_one(path: Path, output: Path, *, options: AnalysisOptions, force: bool) -> Analysis:
+    """Analyze one MCAP, in place where ``output`` is the file itself."""
+    if output != path:
+        check_target(output, path, force)
+    with open_log(path) as log:
+        vehicles = read_recordings(log)
+        start_ns = log.start_ns
+    done, reasons = analyze_recordings(vehicles.values(), options, start_ns)
+    if not done:
+        raise InputError(f"{path}: nothing to compare: {'; '.join(reasons) or 'the log has only one attitude'}")
+    columns = [channel for each in done for channel in each.columns()]
+    output.parent.mkdir(parents=True, exist_ok=True)
+    storage.annotate(path, columns, remove=is_error, output=output)
+    return Analysis(str(path), str(output), ErrorTable.joined(each.table(str(path)) for each in done))
+
+
+@overload
+def analyze(source: str | Path, **options: Any) -> Analysis: ...
+@overload
+def analyze(source: Iterable[str | Path], **options: Any) -> Outcomes[Analysis]: ...
+def analyze(
+    source: str | Path | Iterable[str | Path],
+    *,
+    reference: str | None = None,
+    alignment: str | None = None,
+    start: float | None = None,
+    end: float | None = None,
+    exclude: Sequence[tuple[float, float]] = (),
+    output: str | Path | None = None,
+    force: bool = False,
+    jobs: int | None = None,
+    timeout_s: float = TIMEOUT_S,
+) -> Analysis | Outcomes[Analysis]:
+    """Compare every attitude of an MCAP with a reference and add the errors as ``/error/{name}/attitude``, degrees.
+
+    ``reference`` is ``truth``, ``onboard``, or the name of an attitude; by default the truth, else the autopilot's.
+    ``alignment`` says which constant rotation between the two is removed first: ``none``, ``yaw`` (about the vertical)
+    or ``full``; by default none, but yaw where a heading counts from an arbitrary north. Only samples from ``start`` to
+    ``end`` (seconds from the log's first message) and outside the spans ``exclude`` count.
+
+    One MCAP gives its `Analysis`, or raises InputError; a list gives `Outcomes`.
+    """
+    settings: dict[str, Any] = {
+        "options": AnalysisOptions(reference, alignment, start, end, tuple(exclude)),
+        "force": force,
+    }
+    if isinstance(source, str | Path):
+        target = outputs([Path(source)], output)[0] if output is not None else Path(source)
+        return analyze_one(Path(source), target, **settings)
+    files = expand(source, is_mcap)
+    targets = outputs(files, output) if output is not None else files
+    pairs = zip(files, targets, strict=True)
+    return run_all(
+        [(str(file), partial(analyze_one, file, target, **settings)) for file, target in pairs], jobs, timeout_s
+    )

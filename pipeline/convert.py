@@ -1,0 +1,227 @@
+"""A log of any format to one MCAP."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any, Literal, overload
+
+from .. import ingest, storage
+from ..schemas import records
+from ..schemas.columns import Columns
+from ..schemas.errors import InputError
+from ..schemas.finding import Finding
+from ..schemas.recording import Recording, Segment
+from ..schemas.sensors import SensorProfile, profile
+from ..schemas.source import Completeness, Ingested, IngestOptions, Source
+from .batch import TIMEOUT_S, run_all
+from .bodies import bodies_columns
+from .findings import both
+from .inputs import check_target, expand, head_of, is_mcap, outputs
+from .outcomes import Outcomes
+from .provenance import software
+from .recordings import recordings
+from .text import count, moment, seconds
+
+
+@dataclass(frozen=True)
+class Conversion:
+    """What `convert` did with one log."""
+
+    source: str
+    output: str
+    format: str
+    vehicle: str
+    channels: int
+    messages: int
+    start_ns: int
+    end_ns: int
+    completeness: Completeness
+    segments: tuple[Segment, ...]
+    findings: tuple[Finding, ...]
+
+    @property
+    def complete(self) -> bool:
+        """Whether no byte of the source was skipped."""
+        return self.completeness.complete
+
+    def to_text(self) -> str:
+        """What ``attlog convert`` prints."""
+        size = f"{count(self.channels, 'channel')}, {count(self.messages, 'message')}"
+        lines = [
+            f"{self.source} -> {self.output}",
+            f"  {self.format}{f', {self.vehicle}' if self.vehicle else ''}: {size}, "
+            f"{seconds(self.end_ns - self.start_ns)} from {moment(self.start_ns)}",
+            f"  {completeness_text(self.completeness)}",
+        ]
+        lines += [f"  {line}" for line in segment_lines(self.segments, self.start_ns)]
+        lines += [f"  {line}" for line in finding_lines(self.findings, self.start_ns)]
+        return "\n".join(lines)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The same for --json."""
+        return {
+            "output": self.output,
+            "format": self.format,
+            "vehicle": self.vehicle,
+            "channels": self.channels,
+            "messages": self.messages,
+            "start_ns": self.start_ns,
+            "end_ns": self.end_ns,
+            "complete": self.complete,
+            "completeness": vars(self.completeness) | {"dropped": dict(self.completeness.dropped)},
+            "segments": [vars(segment) for segment in self.segments],
+            "findings": [vars(finding) for finding in self.findings],
+        }
+
+
+def completeness_text(completeness: Completeness) -> str:
+    """``read completely`` or what was skipped."""
+    read = f"read {completeness.bytes_read:,} of {count(completeness.bytes_total, 'byte')}"
+    if completeness.complete:
+        return read
+    dropped = ", ".join(f"{number:,} {reason}" for reason, number in completeness.dropped.items() if number)
+    return f"{read}, skipped {count(completeness.bytes_skipped, 'byte')}" + (f" ({dropped})" if dropped else "")
+
+
+def segment_lines(segments: Iterable[Segment], start_ns: int) -> list[str]:
+    """One line for each segment, where there are several."""
+    listed = list(segments)
+    if len(listed) < 2:
+        return []
+    return [
+        f"segment {s.index}{f' of vehicle {s.vehicle}' if s.vehicle else ''}: "
+        f"{seconds(s.start_ns - start_ns)} to {seconds(s.end_ns - start_ns)}: {s.reason}"
+        for s in listed
+    ]
+
+
+def finding_lines(findings: Iterable[Finding], start_ns: int) -> list[str]:
+    """One line for each finding that is at least a warning."""
+    return [
+        f"{f.severity.name.lower()} at {seconds(f.time_ns - start_ns)}: {f.topic}: {f.kind}: {f.advice}"
+        for f in findings
+        if f.severity >= 30
+    ]
+
+
+def ingest_options(
+    vehicle: int | Literal["all"] | None = None,
+    sensor: str | SensorProfile | None = None,
+    dialect: str = "ardupilotmega",
+) -> IngestOptions:
+    """The options of `convert` and `run` that the ingestors see."""
+    named = profile(sensor) if isinstance(sensor, str) else sensor
+    return IngestOptions(vehicle, named, dialect)
+
+
+def read_source(path: Path, options: IngestOptions) -> tuple[Source, Ingested]:
+    """Recognise and read a log; InputError for an MCAP, which needs no conversion."""
+    if is_mcap(path):
+        raise InputError(f"{path}: is an MCAP already; estimate, analyze, annotate and info take it as it is")
+    source = Source.from_path(path)
+    return source, ingest.read(source, options)
+
+
+def metadata_records(source: Source, ingested: Ingested) -> dict[str, dict[str, str]]:
+    """The file's metadata: where it comes from, how complete it is, the vehicle, its parameters, the segments."""
+    named = {
+        records.SOURCE: {
+            "name": source.name,
+            "sha256": source.sha256,
+            "bytes": str(source.size),
+            "format": ingested.format,
+        },
+        records.COMPLETENESS: records.completeness_record(ingested.completeness),
+        records.VEHICLE: dict(ingested.vehicle),
+        records.PARAMETERS: records.parameters_record(ingested.parameters),
+        records.SEGMENTS: records.segments_record(ingested.segments),
+        records.SOFTWARE: {"converted_by": software()},
+    }
+    return named | {name: dict(entries) for name, entries in ingested.metadata.items()}
+
+
+def ingested_recordings(ingested: Ingested, metadata: dict[str, dict[str, str]]) -> dict[str, Recording]:
+    """The vehicles of a source as recordings."""
+    return recordings(ingested.columns, metadata)
+
+
+def summary(source: Source, ingested: Ingested, output: Path, columns: Iterable[Columns]) -> Conversion:
+    """The result of writing ``columns``."""
+    filled = [channel for channel in columns if len(channel)]
+    times = [(int(channel.time_ns.min()), int(channel.time_ns.max())) for channel in filled]
+    about = ingested.vehicle
+    name = " ".join(about[key] for key in ("autopilot", "type", "firmware") if about.get(key))
+    return Conversion(
+        source=str(source.path or source.name),
+        output=str(output),
+        format=ingested.format,
+        vehicle=name,
+        channels=len(filled),
+        messages=sum(len(channel) for channel in filled),
+        start_ns=min((start for start, _ in times), default=0),
+        end_ns=max((end for _, end in times), default=0),
+        completeness=ingested.completeness,
+        segments=ingested.segments,
+        findings=ingested.findings,
+    )
+
+
+def convert_one(path: Path, output: Path, *, options: IngestOptions, compression: str, force: bool) -> Conversion:
+    """Convert one file; InputError or StorageError say why not."""
+    head_of(path)
+    check_target(output, path, force)
+    source, ingested = read_source(path, options)
+    metadata = metadata_records(source, ingested)
+    vehicles = ingested_recordings(ingested, metadata)
+    viewed = bodies_columns(list(vehicles.values()))
+    columns = [*ingested.columns, *viewed, *both(ingested.findings, ingested.notes)]
+    output.parent.mkdir(parents=True, exist_ok=True)
+    storage.write(output, columns, metadata=metadata, compression=compression, force=force)
+    return summary(source, ingested, output, columns)
+
+
+def is_log(path: Path) -> bool:
+    """Whether some ingestor takes the file; how folders are searched."""
+    try:
+        ingest.recognize(head_of(path), path.name)
+    except InputError:
+        return False
+    return not is_mcap(path)
+
+
+@overload
+def convert(source: str | Path, output: str | Path | None = ..., **options: Any) -> Conversion: ...
+@overload
+def convert(source: Iterable[str | Path], output: str | Path | None = ..., **options: Any) -> Outcomes[Conversion]: ...
+def convert(
+    source: str | Path | Iterable[str | Path],
+    output: str | Path | None = None,
+    *,
+    vehicle: int | Literal["all"] | None = None,
+    sensor: str | SensorProfile | None = None,
+    dialect: str = "ardupilotmega",
+    compression: str = "zstd",
+    force: bool = False,
+    jobs: int | None = None,
+    timeout_s: float = TIMEOUT_S,
+) -> Conversion | Outcomes[Conversion]:
+    """Turn a log into an MCAP: every message of the source, and the unified channels of its sensors and attitudes.
+
+    ``source`` is one log, or a list of files, folders and globs. ``output`` is a file, or a folder; without it the MCAP
+    is written beside the log. ``vehicle`` is the system id whose topics have no prefix ("all": every vehicle has one);
+    ``sensor`` a profile (name or `SensorProfile`) for a source of raw counts; ``compression`` zstd, lz4 or none.
+
+    One log gives its `Conversion`, or raises InputError or StorageError; a list gives `Outcomes`.
+    """
+    settings: dict[str, Any] = {
+        "options": ingest_options(vehicle, sensor, dialect),
+        "compression": compression,
+        "force": force,
+    }
+    if isinstance(source, str | Path):
+        return convert_one(Path(source), outputs([Path(source)], output)[0], **settings)
+    files = expand(source, is_log)
+    pairs = zip(files, outputs(files, output), strict=True)
+    tasks = [(str(file), partial(convert_one, file, target, **settings)) for file, target in pairs]
+    return run_all(tasks, jobs, timeout_s)

@@ -1,0 +1,245 @@
+"""Attitude estimates of a recording, added to its MCAP."""
+
+import dataclasses
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any, overload
+
+from .. import estimators, storage
+from ..schemas.columns import Columns
+from ..schemas.errors import InputError, MissingSensorError, UsageError
+from ..schemas.estimate import Estimate, North
+from ..schemas.finding import Finding
+from ..schemas.recording import Recording
+from ..schemas.unified import estimate_columns
+from .batch import TIMEOUT_S, run_all
+from .bodies import BODIES, TF, bodies_columns
+from .convert import finding_lines
+from .declination import with_declination
+from .findings import ANNOTATIONS, FINDINGS, both, findings_from, notes_from, replaced
+from .inputs import check_target, expand, is_mcap, outputs
+from .outcomes import Outcomes
+from .provenance import made_from
+from .recordings import is_recorded, recordings
+from .text import table
+
+WITH_MAGNETOMETER = ("ecf", "ekf9", "gyro")
+WITHOUT_MAGNETOMETER = ("ecf", "ekf6", "gyro")
+
+
+@dataclass(frozen=True)
+class Made:
+    """One estimate of a log: its topic, its inputs, and how it went."""
+
+    name: str
+    topic: str
+    estimator: str
+    inputs: tuple[str, ...]
+    samples: int
+    north: str
+    declination_deg: float
+    findings: tuple[Finding, ...]
+
+
+@dataclass(frozen=True)
+class Estimation:
+    """What `estimate` did with one log: the estimates made, and those that could not be, with the reason."""
+
+    source: str
+    output: str
+    made: tuple[Made, ...]
+    skipped: Mapping[str, str]
+    start_ns: int
+
+    complete = True
+
+    def to_text(self) -> str:
+        """What ``attlog estimate`` prints."""
+        rows = [(m.topic, f"{m.samples:,}", m.north, f"{m.declination_deg:.1f}", " ".join(m.inputs)) for m in self.made]
+        lines = [self.output, table(("estimate", "samples", "north", "declination [deg]", "inputs"), rows, (1, 3))]
+        lines += [f"skipped {name}: {reason}" for name, reason in self.skipped.items()]
+        for made in self.made:
+            lines += finding_lines(made.findings, self.start_ns)
+        return "\n".join(lines)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The same for --json."""
+        return {
+            "output": self.output,
+            "estimates": [vars(m) | {"findings": [vars(f) for f in m.findings]} for m in self.made],
+            "skipped": dict(self.skipped),
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class Estimated:
+    """A recording with the estimates just made, under their names."""
+
+    recording: Recording
+    estimates: tuple[Estimate, ...]
+    skipped: Mapping[str, str]
+    findings: tuple[Finding, ...]
+
+    def columns(self) -> list[Columns]:
+        """The estimates as channels."""
+        prefix = self.recording.prefix
+        return [
+            estimate_columns(e, prefix=prefix, metadata=made_from(self.recording, e.inputs)) for e in self.estimates
+        ]
+
+    def made(self) -> list[Made]:
+        """What is told of them."""
+        prefix = self.recording.prefix
+        return [
+            Made(
+                e.name,
+                f"{prefix}{e.attitude.topic}",
+                e.estimator,
+                e.inputs,
+                len(e.time_ns),
+                str(e.north),
+                e.declination_deg,
+                e.findings,
+            )
+            for e in self.estimates
+        ]
+
+
+def default_selections(recording: Recording) -> tuple[str, ...]:
+    """What runs where nothing was asked for."""
+    return WITH_MAGNETOMETER if recording.mag else WITHOUT_MAGNETOMETER
+
+
+def estimate_recording(
+    recording: Recording, selected: Sequence[str] | None = None, declination_deg: float | None = None
+) -> Estimated:
+    """Run estimators (``["ecf", "ekf9:imu=1"]``; by default what the sensors allow) on a recording in memory.
+
+    One whose sensor is lacking is skipped, with the reason. UsageError for an unknown estimator or parameter.
+    """
+    chosen = [estimators.parse(text) for text in selected or default_selections(recording)]
+    _check_names([selection.name for selection in chosen])
+    ready, findings = with_declination(recording, declination_deg)
+    estimates: list[Estimate] = []
+    skipped: dict[str, str] = {}
+    for selection in chosen:
+        try:
+            estimates.append(estimators.estimate(ready, selection))
+        except MissingSensorError as error:
+            skipped[selection.name] = str(error)
+    if all(e.north != North.MAGNETIC for e in estimates):
+        findings = []
+    everything = [*findings, *(finding for e in estimates for finding in e.findings)]
+    known = {**recording.estimates, **{e.name: _placed(e, recording.prefix) for e in estimates}}
+    return Estimated(dataclasses.replace(ready, estimates=known), tuple(estimates), skipped, tuple(everything))
+
+
+def _placed(estimate: Estimate, prefix: str) -> Any:
+    attitude = estimate.attitude
+    return dataclasses.replace(attitude, topic=f"{prefix}{attitude.topic}") if prefix else attitude
+
+
+def _check_names(names: Sequence[str]) -> None:
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise UsageError(
+            f"two estimates would be called {', '.join(twice)}: name one with as=, as in -e ecf:kp=1,as=mine"
+        )
+
+
+def open_log(path: Path) -> storage.LogFile:
+    """Open an MCAP; InputError tells what to do with a file that is none."""
+    if path.exists() and not path.is_dir() and not is_mcap(path):
+        raise InputError(f"{path}: is no MCAP; `attlog convert {path}` makes one, `attlog run {path}` does everything")
+    return storage.open(path)
+
+
+def read_recordings(log: storage.LogFile) -> dict[str, Recording]:
+    """The vehicles of an MCAP."""
+    columns = log.read([topic for topic in log.topics if is_recorded(topic)])
+    return recordings(columns.values(), log.metadata)
+
+
+def everything_said(log: storage.LogFile) -> tuple[list[Finding], list[Any]]:
+    """The findings and notes of an MCAP."""
+    said = log.read([topic for topic in (FINDINGS, ANNOTATIONS) if topic in log.topics])
+    return findings_from(said.get(FINDINGS)), notes_from(said.get(ANNOTATIONS))
+
+
+def estimate_one(
+    path: Path, output: Path, *, selected: Sequence[str] | None, declination_deg: float | None, force: bool
+) -> Estimation:
+    """Estimate on one MCAP, in place where ``output`` is the file itself."""
+    if output != path:
+        check_target(output, path, force)
+    with open_log(path) as log:
+        vehicles = read_recordings(log)
+        findings, notes = everything_said(log)
+        start_ns = log.start_ns
+    done = estimate_vehicles(path, vehicles, selected, declination_deg)
+    columns = [channel for each in done for channel in each.columns()]
+    remade = {channel.channel.topic for channel in columns}
+    new = [finding for each in done for finding in each.findings]
+    columns += both(replaced(findings, new, remade.__contains__), notes)
+    columns += bodies_columns([each.recording for each in done])
+    output.parent.mkdir(parents=True, exist_ok=True)
+    storage.annotate(path, columns, remove={TF, BODIES, FINDINGS, ANNOTATIONS}.__contains__, output=output)
+    made = tuple(m for each in done for m in each.made())
+    skipped = {f"{each.recording.prefix}{name}": why for each in done for name, why in each.skipped.items()}
+    return Estimation(str(path), str(output), made, skipped, start_ns)
+
+
+def estimate_vehicles(
+    path: Path, vehicles: Mapping[str, Recording], selected: Sequence[str] | None, declination_deg: float | None
+) -> list[Estimated]:
+    """Estimate on every vehicle that has an IMU; InputError where none could be estimated at all."""
+    done = [
+        estimate_recording(recording, selected, declination_deg) if recording.imu else _untouched(recording)
+        for recording in vehicles.values()
+    ]
+    if not any(each.estimates for each in done):
+        reasons = [reason for each in done for reason in each.skipped.values()]
+        raise InputError(f"{path}: nothing could be estimated: {'; '.join(reasons) or 'the log has no IMU channel'}")
+    return done
+
+
+def _untouched(recording: Recording) -> Estimated:
+    return Estimated(recording, (), {}, ())
+
+
+@overload
+def estimate(source: str | Path, estimators: Sequence[str] | None = ..., **options: Any) -> Estimation: ...
+@overload
+def estimate(
+    source: Iterable[str | Path], estimators: Sequence[str] | None = ..., **options: Any
+) -> Outcomes[Estimation]: ...
+def estimate(
+    source: str | Path | Iterable[str | Path],
+    estimators: Sequence[str] | None = None,
+    *,
+    declination: float | None = None,
+    output: str | Path | None = None,
+    force: bool = False,
+    jobs: int | None = None,
+    timeout_s: float = TIMEOUT_S,
+) -> Estimation | Outcomes[Estimation]:
+    """Estimate the attitude from the sensors of an MCAP and add each estimate as ``/estimate/{name}/attitude``.
+
+    ``estimators`` are names with parameters, as ``"ecf:imu=1,kp=0.3,as=soft"``; by default ecf, ekf9 and gyro, or ecf,
+    ekf6 and gyro without a magnetometer. ``declination`` in degrees, east positive, overrides what the log knows. The
+    file is annotated in place, or copied to ``output``. An estimate of the same name is replaced.
+
+    One MCAP gives its `Estimation`, or raises InputError; a list of files, folders and globs gives `Outcomes`.
+    """
+    settings: dict[str, Any] = {"selected": estimators, "declination_deg": declination, "force": force}
+    if isinstance(source, str | Path):
+        target = outputs([Path(source)], output)[0] if output is not None else Path(source)
+        return estimate_one(Path(source), target, **settings)
+    files = expand(source, is_mcap)
+    targets = outputs(files, output) if output is not None else files
+    pairs = zip(files, targets, strict=True)
+    return run_all(
+        [(str(file), partial(estimate_one, file, target, **settings)) for file, target in pairs], jobs, timeout_s
+    )
