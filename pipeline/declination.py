@@ -45,6 +45,9 @@ def _model(gnss: Mapping[int, Fix]) -> Declination | None:
     moment = datetime.fromtimestamp(int(fix.time_ns[0]) / 1e9, tz=UTC)
     year = moment.year + (moment.timetuple().tm_yday - 1) / 365.25
     height_km = float(fix.altitude_m[0]) / 1000.0
-    model = GeoMag(base_year=int(year))
-    field = model.calculate(float(fix.latitude_deg[0]), float(fix.longitude_deg[0]), height_km, year)
+    try:
+        model = GeoMag(base_year=int(year))
+        field = model.calculate(float(fix.latitude_deg[0]), float(fix.longitude_deg[0]), height_km, year)
+    except ValueError:  # a date that no model covers
+        return None
     return Declination(float(field.d), f"World Magnetic Model at {fix.topic}")

@@ -43,7 +43,13 @@ def _run_shell(code: str, place: Path) -> None:
             continue
         path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
         done = subprocess.run(
-            command, shell=True, cwd=place, env={**os.environ, "PATH": path}, capture_output=True, text=True, check=False
+            command,
+            shell=True,
+            cwd=place,
+            env={**os.environ, "PATH": path},
+            capture_output=True,
+            text=True,
+            check=False,
         )
         # 3: the real radio logs have damaged bytes.
         assert done.returncode in ((0, 3) if "../shared" in command else (0,)), f"{command}\n{done.stderr}"
@@ -64,3 +70,9 @@ def test_links_between_pages_lead_somewhere() -> None:
     for page in PAGES:
         for target in re.findall(r"\]\((?!https?:|#)([^)#]+)", page.read_text()):
             assert (page.parent / target).exists(), f"{page.name} links to {target}"
+
+
+def test_the_reference_of_the_command_line_is_up_to_date() -> None:
+    script = ROOT / "docs" / "cli_reference.py"
+    printed = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, check=True).stdout
+    assert printed == (ROOT / "docs" / "cli.md").read_text(), "python docs/cli_reference.py > docs/cli.md"
