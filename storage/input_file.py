@@ -1,0 +1,58 @@
+"""A file that is read by offset, and never past its end."""
+
+import os
+from pathlib import Path
+from types import TracebackType
+
+from ..schemas.errors import InputError
+from .records import damaged
+
+WINDOW = 1 << 18
+
+
+class InputFile:
+    """An open file: `read` for anything, `peek` for many small pieces one after the other."""
+
+    def __init__(self, path: str | os.PathLike[str]) -> None:
+        self.path = Path(path)
+        try:
+            self._file = open(path, "rb", buffering=0)  # noqa: SIM115 - closed by close()
+        except OSError as error:
+            raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
+        self.size = os.fstat(self._file.fileno()).st_size
+        self._window = (0, b"")
+
+    def read(self, offset: int, length: int) -> bytes:
+        """``length`` bytes from ``offset``; InputError where the file has not so many."""
+        if offset < 0 or length < 0 or offset + length > self.size:
+            raise damaged(self.path, offset, f"{length} bytes are said to lie here, in a file of {self.size}")
+        parts = []
+        try:
+            self._file.seek(offset)
+            while length:
+                part = self._file.read(length)
+                if not part:
+                    raise damaged(self.path, offset, "the file became shorter while it was read")
+                parts.append(part)
+                length -= len(part)
+        except OSError as error:
+            raise InputError(f"{self.path}: byte {offset}: cannot be read: {error.strerror or error}") from error
+        return parts[0] if len(parts) == 1 else b"".join(parts)
+
+    def peek(self, offset: int, length: int) -> bytes:
+        """As `read`, by way of a window that moves along."""
+        start, window = self._window
+        if not start <= offset <= offset + length <= start + len(window):
+            window = self.read(offset, min(max(length, WINDOW), max(length, self.size - offset)))
+            self._window = start, window = offset, window
+        return window[offset - start : offset - start + length]
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+
+    def __enter__(self) -> "InputFile":
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        self.close()
