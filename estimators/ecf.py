@@ -1,0 +1,92 @@
+"""Explicit complementary filter with bias, with a magnetometer or without.
+
+R. Mahony, T. Hamel, J.-M. Pflimlin, Nonlinear complementary filters on the special orthogonal group, IEEE TAC 53(5),
+2008, doi:10.1109/TAC.2008.923738, eq 32. R turns the body into the world:
+
+    dR/dt = R [(gyro - b + kp w_mes) x]                                                            (1)
+    db/dt = -ki w_mes                                                                              (2)
+    w_mes = k_acc f/|f| x R^T e_z + k_mag m/|m| x R^T m0                                           (3)
+
+Each step uses its own interval and this sample's measurement with the attitude before it:
+R_k = R_k-1 Exp((gyro_k - b + kp w_mes) dt). A magnetometer slower than the IMU acts at its own samples, for its own
+interval. What flight needs beyond (3), and what switches it off:
+
+* ``heading_only``: the field turns the estimate about the vertical alone, by the sine of the heading error times
+  cos(dip) of the first field over that of the moment, so that a wrong dip or a disturbed field does not tilt it. False
+  gives (3) as it stands, with m0 the first field.
+* ``gate``: an accelerometer that reads g + x counts 1 / (1 + (x / gate)^2). ``inf`` gives (3).
+
+The bias starts from rest where the log begins at rest.
+"""
+
+import math
+from dataclasses import dataclass
+
+from ..geometry.kernels import Vector
+from ..schemas.estimate import Estimate
+from ..schemas.recording import Recording
+from .alignment import GRAVITY, Start
+from .inputs import prepare
+from .output import block, result
+from .parameters import MargParameters, choice, quantity
+from .registry import Estimator
+from .runs import each_run
+
+
+@dataclass(frozen=True)
+class Parameters(MargParameters):
+    """Gains of (1) to (3)."""
+
+    kp: float = quantity(1.0, "1/s", "gain of the attitude, times k_acc and k_mag")
+    ki: float = quantity(0.05, "1/s^2", "gain of the bias, times k_acc and k_mag")
+    k_acc: float = quantity(0.3, "", "weight of the accelerometer")
+    k_mag: float = quantity(0.3, "", "weight of the magnetometer")
+    gate: float = quantity(2.0, "m/s^2", "excess over gravity at which the accelerometer counts half", minimum=1e-6)
+    heading_only: bool = choice(True, "the magnetometer turns about the vertical only")
+
+
+def run(recording: Recording, parameters: Parameters) -> Estimate:
+    """Filter; raises MissingSensorError without the IMU. Without the magnetometer the heading is arbitrary."""
+    from . import ecf_kernel
+
+    inputs = prepare(recording, parameters, mag=True)
+    output = block(len(inputs.time_ns), [4, 3, 3])
+
+    def begin(start: Start) -> tuple[object, object]:
+        m0 = _m0(parameters.heading_only, start, math.radians(inputs.declination_deg))
+        constants = ecf_kernel.Constants(
+            parameters.kp,
+            parameters.ki,
+            parameters.k_acc,
+            parameters.k_mag,
+            GRAVITY,
+            1.0 / parameters.gate,
+            m0,
+            parameters.heading_only,
+        )
+        return constants, (start.orientation, start.bias)
+
+    each_run(inputs, ecf_kernel.run, begin, output, mag=True)
+    return result("ecf", inputs, dict(zip(("orientation", "angular_velocity", "gyro_bias"), output, strict=True)))
+
+
+def _m0(heading_only: bool, start: Start, declination: float) -> Vector:
+    """The first field's direction in the world; its horizontal direction over cos(dip) where only heading counts."""
+    east, north = math.sin(declination), math.cos(declination)
+    if start.field is None:
+        return (east, north, 0.0)
+    x, y, z = start.field
+    length, level = math.hypot(x, y, z), math.hypot(x, y)
+    if heading_only:
+        return (east * length / level, north * length / level, 0.0)
+    return (x / length, y / length, z / length)
+
+
+ESTIMATOR = Estimator(
+    "ecf",
+    Parameters,
+    run,
+    needs_mag=False,
+    summary="explicit complementary filter with gyro bias (Mahony, Hamel, Pflimlin)",
+    source="Mahony, Hamel, Pflimlin 2008, doi:10.1109/TAC.2008.923738",
+)

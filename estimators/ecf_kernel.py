@@ -1,0 +1,87 @@
+"""The explicit complementary filter's step; `attlog.estimators.ecf` says the equations and their source."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..geometry.jit import kernel, part
+from ..geometry.kernels import Quaternion, Vector, cross, exponential, matrix, multiply, norm, renormalize, turned
+from ..geometry.kernels import turned_back
+from ..schemas.estimate import Status
+from .loop import Floats, Span, Times, march
+
+State = tuple[Quaternion, Vector]
+Output = tuple[Floats, Floats, Floats]
+
+ACCELEROMETER_REJECTED = int(Status.ACCELEROMETER_REJECTED)
+MAGNETOMETER_REJECTED = int(Status.MAGNETOMETER_REJECTED)
+
+
+class Constants(NamedTuple):
+    """Gains of eq 7-10; ``m0`` is the world's magnetic direction; ``gate`` softens the accelerometer (m/s^2)."""
+
+    kp: float
+    ki: float
+    k_acc: float
+    k_mag: float
+    gravity: float
+    gate: float
+    m0: Vector
+    heading_only: bool
+
+
+@part
+def step(
+    c: Constants, state: State, dt: float, rate: Vector, force: Vector, dt_mag: float, field: Vector
+) -> tuple[State, Vector, int]:
+    """Sample k: w_mes from the attitude of k - 1, then R_k = R_k-1 Exp((gyro - b + kp w_mes) dt)."""
+    q, b = state
+    rotation = matrix(q)
+    up = (rotation[6], rotation[7], rotation[8])  # v_hat of gravity: R^T e_z
+    wx = wy = wz = 0.0  # w_mes, times the interval of the sensor that it comes from
+    length = norm(force)
+    if length > 0.0:
+        excess = (length - c.gravity) * c.gate
+        weight = c.k_acc * dt / (length * (1.0 + excess * excess))
+        e = cross(force, up)
+        wx, wy, wz = weight * e[0], weight * e[1], weight * e[2]
+    if dt_mag > 0.0:
+        strength = norm(field)
+        if strength > 0.0:
+            weight = c.k_mag * dt_mag / strength
+            if c.heading_only:
+                f = turned(rotation, field)
+                weight = weight * (f[0] * c.m0[1] - f[1] * c.m0[0])
+                e = up
+            else:
+                e = cross(field, turned_back(rotation, c.m0))
+            wx, wy, wz = wx + weight * e[0], wy + weight * e[1], wz + weight * e[2]
+    u = (rate[0] - b[0], rate[1] - b[1], rate[2] - b[2])
+    turn = exponential(u[0] * dt + c.kp * wx, u[1] * dt + c.kp * wy, u[2] * dt + c.kp * wz)
+    b = (b[0] - c.ki * wx, b[1] - c.ki * wy, b[2] - c.ki * wz)
+    return (multiply(renormalize(q), turn), b), u, 0
+
+
+@part
+def write(output: Output, k: int, c: Constants, state: State, u: Vector) -> None:
+    orientation, angular_velocity, gyro_bias = output
+    q, b = state
+    for i in range(4):
+        orientation[k, i] = q[i]
+    for i in range(3):
+        angular_velocity[k, i] = u[i]
+        gyro_bias[k, i] = b[i]
+
+
+@kernel
+def run(
+    c: Constants,
+    state: State,
+    imu: tuple[Times, Floats, Floats],
+    mag: tuple[Times, Floats],
+    span: Span,
+    output: Output,
+    status: NDArray[np.uint32],
+) -> Any:
+    return march(step, write, c, state, imu, mag, span, output, status)

@@ -1,0 +1,58 @@
+"""Gyro integration as a kernel; `attlog.estimators.gyro` says the equations."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..geometry.jit import kernel, part
+from ..geometry.kernels import Quaternion, Vector, exponential, multiply, renormalize
+from .loop import Floats, Span, Times, march
+
+State = tuple[Quaternion, Vector, Vector]
+"""Attitude, bias, and the rate at the sample before."""
+Output = tuple[Floats, Floats, Floats]
+
+
+@part
+def step(
+    c: None, state: State, dt: float, rate: Vector, force: Vector, dt_mag: float, field: Vector
+) -> tuple[State, Vector, int]:
+    q, b, before = state
+    u = (rate[0] - b[0], rate[1] - b[1], rate[2] - b[2])
+    return (renormalize(multiply(q, mean_turn(before, u, dt))), b, u), u, 0
+
+
+@part
+def mean_turn(a: Vector, b: Vector, dt: float) -> Quaternion:
+    """The turn over an interval at whose ends the rates are a and b: their mean, and the coning term dt^2/12 a x b."""
+    half, cone = 0.5 * dt, dt * dt / 12.0
+    return exponential(
+        half * (a[0] + b[0]) + cone * (a[1] * b[2] - a[2] * b[1]),
+        half * (a[1] + b[1]) + cone * (a[2] * b[0] - a[0] * b[2]),
+        half * (a[2] + b[2]) + cone * (a[0] * b[1] - a[1] * b[0]),
+    )
+
+
+@part
+def write(output: Output, k: int, c: None, state: State, u: Vector) -> None:
+    orientation, angular_velocity, gyro_bias = output
+    q, b, _ = state
+    for i in range(4):
+        orientation[k, i] = q[i]
+    for i in range(3):
+        angular_velocity[k, i] = u[i]
+        gyro_bias[k, i] = b[i]
+
+
+@kernel
+def run(
+    c: None,
+    state: State,
+    imu: tuple[Times, Floats, Floats],
+    mag: tuple[Times, Floats],
+    span: Span,
+    output: Output,
+    status: NDArray[np.uint32],
+) -> Any:
+    return march(step, write, c, state, imu, mag, span, output, status)
