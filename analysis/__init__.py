@@ -3,7 +3,7 @@
 from .alignment import Alignment, ConstantRotation
 from .channels import error_columns
 from .error import AttitudeError, Counts, ErrorOptions, attitude_error, default_alignment
-from .statistics import COMPONENTS, Statistics, statistics
+from .summary import COMPONENTS, Statistics, statistics
 from .table import ErrorRow, ErrorTable
 
 __all__ = [

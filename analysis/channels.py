@@ -7,7 +7,7 @@ from ..schemas.messages import ATTITUDE_ERROR
 from ..schemas.unified import WORLD, table
 from .alignment import Alignment, ConstantRotation
 from .error import AttitudeError
-from .statistics import COMPONENTS
+from .summary import COMPONENTS
 
 
 def error_columns(

@@ -27,7 +27,7 @@ from ..schemas.estimate import North
 from ..schemas.recording import Attitude
 from ..signals.interpolation import covered
 from .alignment import Alignment, ConstantRotation, constant_rotation, wrap_deg
-from .statistics import COMPONENTS, EULER, Statistics, statistics
+from .summary import COMPONENTS, EULER, Statistics, statistics
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]

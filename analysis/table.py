@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 from ..schemas.errors import StorageError
 from .channels import alignment_metadata
 from .error import MAX_PITCH_DEG, AttitudeError, Counts
-from .statistics import COMPONENTS, NUMBERS, Statistics
+from .summary import COMPONENTS, NUMBERS, Statistics
 
 if TYPE_CHECKING:
     import pyarrow as pa

@@ -112,15 +112,14 @@ def _define(
 
 
 @kernel
-def _step(data: Bytes, at: int, sizes: Ints, length: Ints, timed: Flags, lost: bool, now: int) -> tuple[int, int]:
-    """Length of the record at ``at``, 0 if it is to be skipped; then how many bytes at once.
+def _doubtful(
+    data: Bytes, at: int, size: int, sizes: Ints, length: Ints, timed: Flags, lost: bool, now: int
+) -> tuple[int, int]:
+    """A record of ``size`` bytes that no other follows: its size, 0 if it is none; and how many bytes to skip then.
 
-    A record that no other follows has lost bytes if one that is followed begins within it. Behind damage it is
-    believed only if its time is near ``now`` (NONE: not known), or if it is a sound definition.
+    It has lost bytes if a record that is followed begins within it. Behind damage it is believed only if its time is
+    near ``now`` (NONE: not known), or if it is a sound definition.
     """
-    size = _known(data, at, length)
-    if size == 0 or _chained(data, at + size, length):
-        return size, 1
     within = _chained_within(data, at + 1, at + size, length)
     if within >= 0:
         return 0, within - at
@@ -171,7 +170,9 @@ def scan(data: Bytes, sizes: Ints, first: Ints) -> tuple[Ints, Ints, Ints, Ints,
     at = 0
     while at < data.size:
         lost = counts[TAIL] >= 0
-        size, skip = _step(data, at, sizes, length, timed, lost, now)
+        size, skip = _known(data, at, length), 1
+        if size > 0 and not _chained(data, at + size, length):
+            size, skip = _doubtful(data, at, size, sizes, length, timed, lost, now)
         if size == 0:
             if _is_torn_last(data, at, length):
                 counts[TORN_LAST] += 1

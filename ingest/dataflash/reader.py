@@ -20,7 +20,7 @@ def ingest(source: Source, options: IngestOptions, *, text: bool) -> Ingested:
     about = vehicle(log, parameters)
     findings = [*_clock_findings(clock), *_skipped(log, clock)]
     columns = (*_unified(log, clock, findings), *passthrough.columns(log.records, clock))
-    segments = tuple(replace(segment, vehicle=about.get("sysid", "1")) for segment in clock.segments)
+    segments = tuple(replace(segment, vehicle=about.get("sysid", "")) for segment in clock.segments)
     completeness = Completeness(
         source.size, source.size - log.bytes_skipped, log.count, log.bytes_skipped, dict(log.dropped)
     )

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ...geometry.frames import flu_from_frd
 from ...schemas import Columns
 from ...schemas.unified import fix_columns, imu_columns, mag_columns
-from .clock import Clock
+from .clock import FIX_3D, Clock
 from .log import Log, Records
 
 Ints = NDArray[np.int64]
@@ -26,8 +26,8 @@ TESLA_PER_MILLIGAUSS: Final = 1e-7
 INSTANCE_COLUMNS: Final = ("I", "Instance", "Inst")
 """Columns that number the sensor in logs without FMTU."""
 
-NO_FIX: Final = -1
-NAV_STATUS: Final = np.array([NO_FIX, NO_FIX, 0, 0, 1, 2, 2], np.int8)
+FIX_2D: Final = 2
+NAV_STATUS: Final = np.array([-1, -1, 0, 0, 1, 2, 2], np.int8)
 """AP_GPS status (none, no fix, 2D, 3D, differential, RTK float, RTK fixed) -> sensor_msgs/NavSatStatus."""
 
 OWN_TIME_AGE_US: Final = 60_000_000
@@ -109,12 +109,17 @@ def mag(log: Log, clock: Clock) -> Iterator[Columns]:
 
 
 def gnss(log: Log, clock: Clock) -> Iterator[Columns]:
-    """``/gnss{n}/fix``: degrees and metres; the altitude is above mean sea level, as ArduPilot logs it."""
-    for n, records in numbered(log, "GPS").items():
+    """``/gnss{n}/fix``: degrees and metres, where there was a fix; altitude above mean sea level, as ArduPilot logs it."""
+    for n, found in numbered(log, "GPS").items():
+        records = found
         longitude = next((name for name in ("Lng", "Lon") if records.format.has(name)), None)
         if longitude is None or not records.format.has("Lat", "Alt"):
             continue
-        status = records.data["Status"].astype(np.int64) if records.format.has("Status") else np.full(len(records), 3)
+        if records.format.has("Status"):
+            records = records.select(records.data["Status"] >= FIX_2D, records.instance)
+        if len(records) == 0:
+            continue
+        status = records.data["Status"] if records.format.has("Status") else np.full(len(records), FIX_3D)
         metadata = _instance(records) | {"altitude": "above mean sea level"}
         yield fix_columns(
             f"/gnss{n}/fix",
@@ -122,7 +127,7 @@ def gnss(log: Log, clock: Clock) -> Iterator[Columns]:
             records.scaled("Lat"),
             records.scaled(longitude),
             records.scaled("Alt"),
-            NAV_STATUS[np.clip(status, 0, len(NAV_STATUS) - 1)],
+            NAV_STATUS[np.minimum(status, len(NAV_STATUS) - 1)],
             source=records.format.name,
             metadata=metadata,
         )

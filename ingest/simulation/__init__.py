@@ -8,10 +8,10 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from ...schemas.errors import UsageError
+from .catalog import SCENARIOS, Scenario, scenarios
 from .columns import ingested, write_mcap
 from .motion import Motion, Trajectory
 from .run import SimulatedRun, run_scenario, simulate
-from .scenarios import SCENARIOS, Scenario, scenarios
 
 __all__ = [
     "SCENARIOS",

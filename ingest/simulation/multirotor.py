@@ -13,7 +13,7 @@ almost nothing of a coordinated turn: what makes attitude estimation in flight h
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -60,7 +60,7 @@ class Multirotor:
     wind: tuple[float, float, float] = (0.0, 0.0, 0.0)
     drag: float = 0.25
     blend_s: float = 1.0
-    phases: tuple[float, ...] = field(default=())
+    phases: tuple[float, ...] = ()
 
     @property
     def duration_s(self) -> float:
@@ -136,7 +136,8 @@ class Multirotor:
         width = len(amplitudes[0]) if amplitudes else 1
         sums = [np.zeros((len(time_s), width)) for _ in range(3)]
         f = [self._flying(time_s, k) for k in range(3)]
-        for gust, amplitude, phase in zip(self.gusts, amplitudes, self.phases, strict=True):
+        phases = self.phases or (0.0,) * len(self.gusts)
+        for gust, amplitude, phase in zip(self.gusts, amplitudes, phases, strict=True):
             w = 2.0 * np.pi * gust.frequency_hz
             s, c = np.sin(w * time_s + phase), np.cos(w * time_s + phase)
             derivatives = (f[0] * s, f[1] * s + f[0] * w * c, f[2] * s + 2.0 * f[1] * w * c - f[0] * w * w * s)

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...schemas.recording import Attitude, Declination, Fix, Imu, Magnetometer, Recording, Segment
+from .catalog import Scenario, scenario
 from .motion import Floats, Motion, Trajectory
-from .scenarios import Scenario, scenario
 from .sensors import Suite, measured
 
 IMU_TOPIC = "/imu0/data_raw"

@@ -1,7 +1,7 @@
 """Sensors as data: when they sample, and what they make of the truth."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -104,7 +104,7 @@ class Suite:
     position_noise_m: Vector = ZERO
     first_fix_s: float = 0.0
     vibrations: tuple[Vibration, ...] = ()
-    disturbances: tuple[Disturbance, ...] = field(default=())
+    disturbances: tuple[Disturbance, ...] = ()
 
 
 def measured(

@@ -2,12 +2,13 @@
 
 import numpy as np
 import pytest
-from attlog.analysis.alignment import Alignment, constant_rotation, wrap_deg
-from attlog.geometry.frames import turn_heading
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
+
+from attlog.analysis.alignment import Alignment, constant_rotation, wrap_deg
+from attlog.geometry.frames import turn_heading
 
 ANGLE = st.floats(-np.pi, np.pi)
 VECTOR = st.tuples(*[st.floats(-2.0, 2.0)] * 3)

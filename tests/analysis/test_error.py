@@ -4,12 +4,13 @@ import dataclasses
 
 import numpy as np
 import pytest
-from attlog.analysis import Alignment, attitude_error, default_alignment
-from attlog.geometry.frames import orientation_from_rpy_ned, rpy_ned_deg, turn_heading
-from attlog.schemas import Attitude, UsageError
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation, Slerp
+
+from attlog.analysis import Alignment, attitude_error, default_alignment
+from attlog.geometry.frames import orientation_from_rpy_ned, rpy_ned_deg, turn_heading
+from attlog.schemas import Attitude, UsageError
 
 MS = 1_000_000
 

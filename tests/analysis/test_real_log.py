@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from attlog.analysis import attitude_error
 from attlog.geometry.frames import orientation_from_rpy_ned
 from attlog.schemas import Attitude

@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+
 from attlog.analysis import COMPONENTS, ErrorTable, attitude_error, error_columns
 from attlog.geometry.frames import orientation_from_rpy_ned, turn_heading
 from attlog.schemas import Attitude, StorageError

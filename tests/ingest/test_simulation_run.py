@@ -112,7 +112,7 @@ def test_attitude_is_trimmed_and_a_little_wrong(run, messages):
 
 def test_parameters_modes_texts_and_time(run, messages):
     parameters = {m.param_id: m.param_value for _, m in messages["PARAM_VALUE"]}
-    assert np.degrees(parameters["COMPASS_DEC"]) == pytest.approx(14.9, abs=1e-5)
+    assert np.degrees(parameters["COMPASS_DEC"]) == pytest.approx(11.53, abs=1e-5)
     assert (parameters["AHRS_TRIM_X"], parameters["AHRS_TRIM_Y"]) == pytest.approx(run.scenario.autopilot.trim_rad)
     beats = [m for _, m in messages["HEARTBEAT"]]
     assert {(m.type, m.autopilot) for m in beats} == {(2, 3)}
@@ -132,7 +132,7 @@ def test_gps_has_no_fix_at_first_and_then_the_path(run, messages):
     assert (fixes[0].lat, fixes[0].lon) == (0, 0)
     place = rows(messages, "GPS_RAW_INT", "lat", "lon", "alt")[10:] * [1e-7, 1e-7, 1e-3]
     truth = run.scenario.place.geodetic(run.satellites.position)[10:]
-    metres = (place - truth) * [111180.0, 75200.0, 1.0]
+    metres = (place - truth) * [110940.0, 91200.0, 1.0]
     np.testing.assert_allclose(metres.std(axis=0), [0.3, 0.3, 0.6], rtol=0.2)
 
 
@@ -158,7 +158,7 @@ def test_the_recording_and_the_columns_hold_the_same_run(run):
     recording = run.recording
     np.testing.assert_array_equal(topics["/imu0/data_raw"].time_ns, recording.imu[0].time_ns)
     assert len(recording.gnss[0].time_ns) == int(run.fixed.sum())
-    assert recording.declination.degrees == pytest.approx(14.9)
+    assert recording.declination.degrees == pytest.approx(11.53)
     assert all(c.channel.metadata["source"] == "simulation" for c in log.columns)
     assert all(c.channel.metadata["seed"] == "1" for c in log.columns)
     assert [note.text for note in log.notes if note.name == "HEARTBEAT"][1] == "mode GUIDED, disarmed"

@@ -1,6 +1,7 @@
 """Where interpolation is allowed."""
 
 import numpy as np
+
 from attlog.signals.interpolation import covered, median_interval_ns
 
 

@@ -37,13 +37,13 @@ class Scenario:
         return replace(self.trajectory, phases=tuple(float(phase) for phase in phases))
 
 
-_SEATTLE = Place(  # World Magnetic Model 2025 at mid-2026
-    latitude_deg=47.6,
-    longitude_deg=-122.3,
-    altitude_m=50.0,
-    declination_deg=14.9,
-    inclination_deg=68.77,
-    field_t=52.64 * MICROTESLA,
+_MOJAVE = Place(  # World Magnetic Model 2025 at mid-2026
+    latitude_deg=35.05,
+    longitude_deg=-118.15,
+    altitude_m=840.0,
+    declination_deg=11.53,
+    inclination_deg=59.62,
+    field_t=46.53 * MICROTESLA,
 )
 
 _FLIGHT = Multirotor(
@@ -51,21 +51,21 @@ _FLIGHT = Multirotor(
         Manoeuvre(12.0, flying=False),
         Manoeuvre(6.0, climb=2.5),
         Manoeuvre(3.0, turn_deg_s=30.0),
-        Manoeuvre(5.0, speed=9.0),
-        Manoeuvre(12.0, speed=9.0, turn_deg_s=24.0),
-        Manoeuvre(4.0, speed=11.0),
-        Manoeuvre(10.0, speed=8.0, turn_deg_s=-32.0),
+        Manoeuvre(4.0, speed=5.0),
+        Manoeuvre(9.0, speed=5.0, turn_deg_s=22.0),
+        Manoeuvre(5.0, speed=6.0),
+        Manoeuvre(8.0, speed=5.0, turn_deg_s=-28.0),
         Manoeuvre(4.0),
         Manoeuvre(4.0, turn_deg_s=60.0),
-        Manoeuvre(5.0, speed=12.0),
-        Manoeuvre(3.0, speed=2.0),
-        Manoeuvre(3.0, speed=7.0, turn_deg_s=40.0),
-        Manoeuvre(3.0, speed=7.0, turn_deg_s=-40.0),
-        Manoeuvre(3.0, speed=7.0, turn_deg_s=40.0),
-        Manoeuvre(3.0, speed=7.0, turn_deg_s=-40.0),
-        Manoeuvre(4.0),
+        Manoeuvre(5.0, speed=8.0),
+        Manoeuvre(4.0, speed=2.0),
+        Manoeuvre(3.0, speed=4.0, turn_deg_s=40.0),
+        Manoeuvre(3.0, speed=4.0, turn_deg_s=-40.0),
+        Manoeuvre(3.0, speed=4.0, turn_deg_s=40.0),
+        Manoeuvre(3.0, speed=4.0, turn_deg_s=-40.0),
+        Manoeuvre(5.0),
         Manoeuvre(6.0, climb=-2.5),
-        Manoeuvre(6.0, flying=False),
+        Manoeuvre(8.0, flying=False),
     ),
     gusts=(
         Gust(0.23, (0.25, 0.20, 0.08), 1.5),
@@ -75,7 +75,7 @@ _FLIGHT = Multirotor(
     ),
     heading_deg=35.0,
     slope_deg=(1.2, -0.7),
-    wind=(2.5, -1.0, 0.0),
+    wind=(1.5, -0.6, 0.0),
 )
 
 _SENSORS = Suite(  # of the size that a small autopilot's sensors have, gyro bias on the large side
@@ -83,7 +83,8 @@ _SENSORS = Suite(  # of the size that a small autopilot's sensors have, gyro bia
     gyroscope=Triad(
         noise_density=radians(0.01),
         bias=(radians(0.5), radians(-0.3), radians(0.4)),
-        bias_walk=radians(0.002),
+        bias_walk=radians(0.02),  # still warming up
+        matrix=((1.004, 0.002, -0.001), (-0.002, 0.997, 0.002), (0.001, -0.002, 1.003)),
         quantum=radians(1.0 / 16.4),
         limit=radians(2000.0),
     ),
@@ -106,7 +107,7 @@ _SENSORS = Suite(  # of the size that a small autopilot's sensors have, gyro bia
     position_noise_m=(0.3, 0.3, 0.6),
     first_fix_s=2.0,
     vibrations=(Vibration(87.0, (0.5, 0.4, 0.9)), Vibration(174.0, (0.15, 0.2, 0.3))),
-    disturbances=(Disturbance(62.0, 70.0, (4.0 * MICROTESLA, -2.0 * MICROTESLA, 1.0 * MICROTESLA)),),
+    disturbances=(Disturbance(60.0, 68.0, (4.0 * MICROTESLA, -2.0 * MICROTESLA, 1.0 * MICROTESLA)),),
 )
 
 _TRIM = (0.012, -0.021)
@@ -121,25 +122,25 @@ _ARDUCOPTER = Autopilot(
         Mode(0.0, 0, "STABILIZE", armed=False),
         Mode(9.0, 4, "GUIDED", armed=False),
         Mode(10.0, 4, "GUIDED", armed=True),
-        Mode(26.0, 7, "CIRCLE", armed=True),
-        Mode(53.0, 5, "LOITER", armed=True),
-        Mode(84.0, 9, "LAND", armed=True),
-        Mode(93.5, 9, "LAND", armed=False),
+        Mode(25.0, 7, "CIRCLE", armed=True),
+        Mode(47.0, 5, "LOITER", armed=True),
+        Mode(81.0, 9, "LAND", armed=True),
+        Mode(90.0, 9, "LAND", armed=False),
     ),
     remarks=(
         Remark(0.5, 6, "simulated by attlog: scenario flight"),
         Remark(2.1, 6, "GPS 1: detected fix"),
         Remark(10.0, 6, "Arming motors"),
         Remark(12.0, 6, "Taking off"),
-        Remark(62.5, 4, "Compass: field disturbed"),
-        Remark(84.0, 6, "Landing"),
-        Remark(93.5, 6, "Disarming motors"),
+        Remark(60.5, 4, "Compass: field disturbed"),
+        Remark(81.0, 6, "Landing"),
+        Remark(90.0, 6, "Disarming motors"),
     ),
     parameters={
         "AHRS_TRIM_X": _TRIM[0],
         "AHRS_TRIM_Y": _TRIM[1],
         "AHRS_TRIM_Z": 0.0,
-        "COMPASS_DEC": radians(_SEATTLE.declination_deg),
+        "COMPASS_DEC": radians(_MOJAVE.declination_deg),
     },
 )
 
@@ -148,7 +149,7 @@ SCENARIOS: Mapping[str, Scenario] = {
         name="flight",
         summary="a small multirotor: rest, take-off, turns, braking, a slalom, a magnetic disturbance, landing",
         trajectory=_FLIGHT,
-        place=_SEATTLE,
+        place=_MOJAVE,
         sensors=_SENSORS,
         autopilot=_ARDUCOPTER,
         truth_hz=50.0,
