@@ -207,3 +207,25 @@ def test_the_sample_log_is_what_its_command_makes(root, run):
     sample = root / "data" / "demo_flight.tlog"
     assert sample.read_bytes() == tlog_bytes(run)
     assert "attlog simulate flight --seed 1 -o data/demo_flight.tlog" in (root / "data" / "README.md").read_text()
+
+
+def test_an_mcap_of_the_run_holds_the_very_numbers(run, tmp_path):
+    """In memory or through a file: the same arrays, to the last bit."""
+    from mcap.reader import make_reader
+
+    from attlog import storage
+    from attlog.schemas.unified import quaternions, vectors
+
+    path = tmp_path / "run.mcap"
+    simulation.write(run, path)
+    with storage.open(path) as log:
+        imu, truth = log["/imu0/data_raw"], log["/reference/attitude"]
+        np.testing.assert_array_equal(imu.time_ns, run.imu.time_ns)
+        np.testing.assert_array_equal(vectors(imu.data, "angular_velocity"), run.imu.angular_velocity)
+        np.testing.assert_array_equal(vectors(imu.data, "linear_acceleration"), run.imu.specific_force)
+        np.testing.assert_array_equal(quaternions(truth.data, "orientation"), run.reference.orientation)
+    with path.open("rb") as file:
+        reader = make_reader(file, validate_crcs=True)
+        assert sum(1 for _ in reader.iter_messages()) == sum(len(c) for c in simulation.ingested(run).columns)
+        parameters = next(m.metadata for m in reader.iter_metadata() if m.name == "parameters")
+    assert np.degrees(float(parameters["COMPASS_DEC"])) == pytest.approx(11.53)
