@@ -1,10 +1,8 @@
 """The scenarios: data, not code. Each is a trajectory, a place, a suite of sensors and an autopilot."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import radians
-
-import numpy as np
 
 from ...schemas.errors import UsageError
 from .autopilot import Autopilot, Mode, Remark
@@ -23,18 +21,13 @@ class Scenario:
 
     name: str
     summary: str
-    trajectory: Multirotor
+    trajectory: Trajectory
     place: Place
     sensors: Suite
     autopilot: Autopilot
     truth_hz: float
     start_ns: int
     boot_s: float
-
-    def path(self, random: np.random.Generator) -> Trajectory:
-        """The trajectory with its phases drawn."""
-        phases = random.uniform(0.0, 2.0 * np.pi, len(self.trajectory.gusts))
-        return replace(self.trajectory, phases=tuple(float(phase) for phase in phases))
 
 
 _MOJAVE = Place(  # World Magnetic Model 2025 at mid-2026

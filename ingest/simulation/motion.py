@@ -49,6 +49,10 @@ class Trajectory(Protocol):
         """From the first instant, 0, to the last."""
         ...
 
+    def drawn(self, random: np.random.Generator) -> "Trajectory":
+        """The same with what differs from run to run (phases, amplitudes) drawn; itself where nothing does."""
+        ...
+
     def at(self, time_s: Floats) -> Motion:
         """The motion at any instants (n,), in any order; the body rests before 0 and after the end."""
         ...

@@ -13,7 +13,7 @@ almost nothing of a coordinated turn: what makes attitude estimation in flight h
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -66,6 +66,10 @@ class Multirotor:
     def duration_s(self) -> float:
         """Sum of the manoeuvres."""
         return float(sum(m.duration_s for m in self.manoeuvres))
+
+    def drawn(self, random: np.random.Generator) -> "Multirotor":
+        """The same flight with the gusts' phases drawn."""
+        return replace(self, phases=tuple(random.uniform(0.0, 2.0 * np.pi, len(self.gusts)).tolist()))
 
     def at(self, time_s: Floats) -> Motion:
         """See `Trajectory.at`."""

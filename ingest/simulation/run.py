@@ -83,7 +83,7 @@ def simulate(name: str = "flight", seed: int = 0) -> SimulatedRun:
 
 def run_scenario(chosen: Scenario, seed: int) -> SimulatedRun:
     """Run any scenario, be it registered or not."""
-    path = chosen.path(_random(seed, "path"))
+    path = chosen.trajectory.drawn(_random(seed, "path"))
     end_s, pilot = chosen.trajectory.duration_s, chosen.autopilot
     imu = _imu(chosen, path, seed)
     magnetometer = _magnetometer(chosen, path, seed)

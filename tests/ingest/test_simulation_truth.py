@@ -14,7 +14,7 @@ from attlog.ingest.simulation.profiles import held
 
 @pytest.fixture(scope="module", params=list(SCENARIOS))
 def path(request):
-    return SCENARIOS[request.param].path(np.random.default_rng(7))
+    return SCENARIOS[request.param].trajectory.drawn(np.random.default_rng(7))
 
 
 def differenced(function, time_s, h):
@@ -47,7 +47,7 @@ def test_attitudes_are_rotations(path):
 
 def test_at_rest_force_and_field_turn_back_to_constants():
     scenario = SCENARIOS["flight"]
-    path = scenario.path(np.random.default_rng(0))
+    path = scenario.trajectory.drawn(np.random.default_rng(0))
     motion = path.at(np.linspace(0.0, 8.0, 100))
     assert np.abs(motion.angular_velocity).max() == 0.0
     assert np.abs(motion.velocity).max() == 0.0
@@ -60,7 +60,7 @@ def test_at_rest_force_and_field_turn_back_to_constants():
 
 def test_specific_force_obeys_newton():
     """Turned into the world and freed of gravity it is the acceleration, also in flight; rotors push along body z."""
-    path = SCENARIOS["flight"].path(np.random.default_rng(0))
+    path = SCENARIOS["flight"].trajectory.drawn(np.random.default_rng(0))
     motion = path.at(np.linspace(20.0, 80.0, 1000))
     world = Rotation.from_quat(motion.orientation).apply(motion.specific_force) - [0, 0, GRAVITY]
     np.testing.assert_allclose(world, motion.acceleration, atol=1e-12)
@@ -70,7 +70,7 @@ def test_specific_force_obeys_newton():
 
 
 def test_the_flight_banks_and_travels():
-    path = SCENARIOS["flight"].path(np.random.default_rng(0))
+    path = SCENARIOS["flight"].trajectory.drawn(np.random.default_rng(0))
     motion = path.at(np.linspace(0.0, path.duration_s, 2000))
     rpy = rpy_ned_deg(motion.orientation)
     assert np.abs(rpy[:, :2]).max() > 20.0
