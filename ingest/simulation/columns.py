@@ -1,5 +1,6 @@
 """A run as the columns of a log, with nothing lost to a telemetry link."""
 
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ from ...schemas.columns import Columns
 from ...schemas.finding import Note, Severity
 from ...schemas.source import Completeness, Ingested
 from ...schemas.unified import attitude_columns, fix_columns, imu_columns, mag_columns
+from .autopilot import Mode
 from .run import SimulatedRun
 
 SOURCE = "simulation"
@@ -56,17 +58,23 @@ def run_columns(run: SimulatedRun) -> tuple[Columns, ...]:
 
 
 def notes(run: SimulatedRun) -> tuple[Note, ...]:
-    """What the autopilot says, and its changes of mode, in order of time."""
+    """What the autopilot says, and its changes of mode and arming, in order of time."""
     pilot = run.scenario.autopilot
     said = [(r.time_s, _SEVERITIES.get(r.severity, Severity.INFO), "STATUSTEXT", r.text) for r in pilot.remarks]
-    said += [(m.time_s, Severity.INFO, "HEARTBEAT", _mode(m.name, m.armed)) for m in pilot.modes]
+    said += [(time_s, Severity.INFO, name, text) for time_s, name, text in _changes(pilot.modes)]
     stamps = run.stamps_ns(np.array([line[0] for line in said]))
     lines = (Note(int(stamp), *line[1:]) for stamp, line in zip(stamps, said, strict=True))
     return tuple(sorted(lines, key=lambda note: note.time_ns))
 
 
-def _mode(name: str, armed: bool) -> str:
-    return f"mode {name}, {'armed' if armed else 'disarmed'}"
+def _changes(modes: Sequence[Mode]) -> Iterator[tuple[float, str, str]]:
+    name, armed = "", False
+    for mode in modes:
+        if mode.name != name:
+            yield mode.time_s, "mode", f"mode {mode.name}"
+        if mode.armed != armed:
+            yield mode.time_s, "arming", "armed" if mode.armed else "disarmed"
+        name, armed = mode.name, mode.armed
 
 
 def write_mcap(run: SimulatedRun, path: str | Path, *, compression: str = "zstd", force: bool = False) -> None:

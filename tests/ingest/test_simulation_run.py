@@ -161,7 +161,8 @@ def test_the_recording_and_the_columns_hold_the_same_run(run):
     assert recording.declination.degrees == pytest.approx(11.53)
     assert all(c.channel.metadata["source"] == "simulation" for c in log.columns)
     assert all(c.channel.metadata["seed"] == "1" for c in log.columns)
-    assert [note.text for note in log.notes if note.name == "HEARTBEAT"][1] == "mode GUIDED, disarmed"
+    assert [note.text for note in log.notes if note.name == "arming"] == ["armed", "disarmed"]
+    assert [note.text for note in log.notes if note.name == "mode"][:2] == ["mode STABILIZE", "mode GUIDED"]
     assert all(a.time_ns <= b.time_ns for a, b in zip(log.notes, log.notes[1:], strict=False))
 
 
