@@ -12,15 +12,15 @@ Conventions, everywhere in this package and said once here:
 * Errors that a user can mend are `AttlogError`; their message says what, where and what to do next.
 
 The calls behind the command line's verbs (`convert`, `estimate`, `analyze`, `run`, `info`, `annotate`, `simulate`) take
-one log and return its result, or take a list of files, folders and globs and return the `Outcomes` of them all.
-`open` reads an MCAP.
+one log and return its result, or take a list of files, folders and globs and return the `Outcomes` of them all;
+`for_each` does the latter with a number of jobs. `open` reads an MCAP.
 """
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .pipeline import analyze, annotate, convert, estimate, info, run, simulate
+    from .pipeline import analyze, annotate, convert, estimate, for_each, info, run, simulate
     from .schemas.errors import AttlogError, InputError, MissingSensorError, StorageError, UsageError
     from .storage import open
 
@@ -29,6 +29,7 @@ _HOME = {
     "annotate": ".pipeline",
     "convert": ".pipeline",
     "estimate": ".pipeline",
+    "for_each": ".pipeline",
     "info": ".pipeline",
     "run": ".pipeline",
     "simulate": ".pipeline",
@@ -51,6 +52,7 @@ __all__ = [
     "annotate",
     "convert",
     "estimate",
+    "for_each",
     "info",
     "open",
     "run",

@@ -93,7 +93,7 @@ def convert(logs: Sequence[str], jobs: int | None, timeout: float, as_json: bool
     from . import pipeline
 
     options["vehicle"] = _vehicle(options["vehicle"])
-    _show(pipeline.convert(list(logs), jobs=jobs, timeout_s=timeout, **options), as_json)
+    _show(pipeline.for_each(pipeline.convert, logs, jobs=jobs, timeout_s=timeout, **options), as_json)
 
 
 @cli.command()
@@ -107,7 +107,7 @@ def estimate(
     from . import pipeline
 
     chosen = list(estimators) or None
-    _show(pipeline.estimate(list(logs), chosen, jobs=jobs, timeout_s=timeout, **options), as_json)
+    _show(pipeline.for_each(pipeline.estimate, logs, chosen, jobs=jobs, timeout_s=timeout, **options), as_json)
 
 
 @cli.command()
@@ -130,7 +130,8 @@ def analyze(
     from .analysis.table import ErrorTable
 
     spans = [_span(text) for text in exclude]
-    done = pipeline.analyze(list(logs), exclude=spans, jobs=jobs, timeout_s=timeout, force=force, **options)
+    options |= {"exclude": spans, "force": force}
+    done = pipeline.for_each(pipeline.analyze, logs, jobs=jobs, timeout_s=timeout, **options)
     if parquet is not None and done.results:
         ErrorTable.joined(result.table for result in done.results).to_parquet(parquet, force=force)
     _show(done, as_json)
@@ -156,7 +157,7 @@ def run(
 
     options["vehicle"] = _vehicle(options["vehicle"])
     options |= {"estimators": list(estimators) or None, "exclude": [_span(text) for text in exclude]}
-    _show(pipeline.run(list(logs), jobs=jobs, timeout_s=timeout, **options), as_json)
+    _show(pipeline.for_each(pipeline.run, logs, jobs=jobs, timeout_s=timeout, **options), as_json)
 
 
 @cli.command()
@@ -168,7 +169,7 @@ def info(logs: Sequence[str], jobs: int | None, timeout: float, as_json: bool) -
     """Tell what is in MCAPs: topics, types, counts, rates, time span, source, completeness."""
     from . import pipeline
 
-    _show(pipeline.info(list(logs), jobs=jobs, timeout_s=timeout), as_json)
+    _show(pipeline.for_each(pipeline.info, logs, jobs=jobs or 1, timeout_s=timeout), as_json)
 
 
 @cli.command()
@@ -200,7 +201,7 @@ def annotate(
         raise click.UsageError('a note needs a log and a text: attlog annotate FILE --at 12.3s "text"')
     if list_only and (at is not None or options["notes"] or options["remove"]):
         raise click.UsageError("--list goes without --at, --notes and --remove")
-    _show(pipeline.annotate(files, text, at=at, jobs=jobs, timeout_s=timeout, **options), as_json)
+    _show(pipeline.for_each(pipeline.annotate, files, text, at=at, jobs=jobs, timeout_s=timeout, **options), as_json)
 
 
 @cli.command()

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Row:
-    """``ratio``: how many times as fast as the peer (or, ``at_most``, the share of the peer's time); ``target`` the bound."""
+    """How many times as fast as the peer (or, ``at_most``, the share of the peer's time), and the bound."""
 
     work: str
     peer: str

@@ -1,4 +1,4 @@
-"""``attlog run`` on a 40 MB DataFlash log, everything included, against pymavlink merely iterating over the same file."""
+"""``attlog run`` on a 40 MB DataFlash log, everything included, against pymavlink merely iterating over it."""
 
 import resource
 import subprocess

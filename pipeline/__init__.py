@@ -7,5 +7,6 @@ from .estimate import estimate
 from .info import info
 from .run import run
 from .simulate import simulate
+from .verbs import for_each
 
-__all__ = ["analyze", "annotate", "convert", "estimate", "info", "run", "simulate"]
+__all__ = ["analyze", "annotate", "convert", "estimate", "for_each", "info", "run", "simulate"]

@@ -2,9 +2,8 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
-from typing import Any, overload
+from typing import Any
 
 from .. import storage
 from ..analysis.channels import error_columns
@@ -13,11 +12,10 @@ from ..analysis.table import ErrorTable
 from ..schemas.columns import Columns
 from ..schemas.errors import InputError
 from ..schemas.recording import Attitude, Recording
-from .batch import TIMEOUT_S, run_all
 from .estimate import open_log, read_recordings
-from .inputs import check_target, expand, is_mcap, outputs
-from .outcomes import Outcomes
+from .inputs import in_place_target, is_mcap
 from .provenance import software
+from .verbs import Place, verb
 
 TRUTH = "truth"
 ONBOARD = "onboard"
@@ -139,58 +137,39 @@ def is_error(topic: str) -> bool:
     return "error" in parts[1:3]
 
 
-def analyze_one(path: Path, output: Path, *, options: AnalysisOptions, force: bool) -> Analysis:
-    """Analyze one MCAP, in place where ``output`` is the file itself."""
-    if output != path:
-        check_target(output, path, force)
-    with open_log(path) as log:
-        vehicles = read_recordings(log)
-        start_ns = log.start_ns
-    done, reasons = analyze_recordings(vehicles.values(), options, start_ns)
-    if not done:
-        raise InputError(f"{path}: nothing to compare: {'; '.join(reasons) or 'the log has only one attitude'}")
-    columns = [channel for each in done for channel in each.columns()]
-    output.parent.mkdir(parents=True, exist_ok=True)
-    storage.annotate(path, columns, remove=is_error, output=output)
-    return Analysis(str(path), str(output), ErrorTable.joined(each.table(str(path)) for each in done))
-
-
-@overload
-def analyze(source: str | Path, **options: Any) -> Analysis: ...
-@overload
-def analyze(source: Iterable[str | Path], **options: Any) -> Outcomes[Analysis]: ...
+@verb(is_mcap, in_place=True)
 def analyze(
-    source: str | Path | Iterable[str | Path],
+    source: Place,
     *,
     reference: str | None = None,
     alignment: str | None = None,
     start: float | None = None,
     end: float | None = None,
     exclude: Sequence[tuple[float, float]] = (),
-    output: str | Path | None = None,
+    output: Place | None = None,
     force: bool = False,
-    jobs: int | None = None,
-    timeout_s: float = TIMEOUT_S,
-) -> Analysis | Outcomes[Analysis]:
+) -> Analysis:
     """Compare every attitude of an MCAP with a reference and add the errors as ``/error/{name}/attitude``, degrees.
 
     ``reference`` is ``truth``, ``onboard``, or the name of an attitude; by default the truth, else the autopilot's.
     ``alignment`` says which constant rotation between the two is removed first: ``none``, ``yaw`` (about the vertical)
     or ``full``; by default none, but yaw where a heading counts from an arbitrary north. Only samples from ``start`` to
-    ``end`` (seconds from the log's first message) and outside the spans ``exclude`` count.
-
-    One MCAP gives its `Analysis`, or raises InputError; a list gives `Outcomes`.
+    ``end`` (seconds from the log's first message) and outside the spans ``exclude`` count. The file is annotated in
+    place, or copied to ``output``. InputError where the file cannot be read or has nothing to compare.
     """
-    settings: dict[str, Any] = {
-        "options": AnalysisOptions(reference, alignment, start, end, tuple(exclude)),
-        "force": force,
-    }
-    if isinstance(source, str | Path):
-        target = outputs([Path(source)], output)[0] if output is not None else Path(source)
-        return analyze_one(Path(source), target, **settings)
-    files = expand(source, is_mcap)
-    targets = outputs(files, output) if output is not None else files
-    pairs = zip(files, targets, strict=True)
-    return run_all(
-        [(str(file), partial(analyze_one, file, target, **settings)) for file, target in pairs], jobs, timeout_s
-    )
+    path, target = Path(source), in_place_target(source, output, force)
+    with open_log(path) as log:
+        vehicles = read_recordings(log)
+        start_ns = log.start_ns
+    options = AnalysisOptions(reference, alignment, start, end, tuple(exclude))
+    done, reasons = analyze_recordings(vehicles.values(), options, start_ns)
+    if not done:
+        raise InputError(f"{path}: nothing to compare: {'; '.join(reasons) or 'the log has only one attitude'}")
+    columns = [channel for each in done for channel in each.columns()]
+    storage.annotate(path, columns, remove=is_error, output=target)
+    return analysis(path, target, done)
+
+
+def analysis(source: Path, output: Path, done: Sequence[Analyzed]) -> Analysis:
+    """The result for all vehicles of a log."""
+    return Analysis(str(source), str(output), ErrorTable.joined(each.table(str(output)) for each in done))

@@ -2,22 +2,20 @@
 
 import csv
 import re
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from datetime import datetime
-from functools import partial
 from pathlib import Path
-from typing import Any, overload
+from typing import Any
 
 from .. import storage
 from ..schemas.errors import InputError, UsageError
 from ..schemas.finding import Note, Severity
-from .batch import TIMEOUT_S, run_all
 from .estimate import everything_said, open_log
 from .findings import ANNOTATIONS, PERSON, notes_columns
-from .inputs import check_target, expand, is_mcap, outputs
-from .outcomes import Outcomes
+from .inputs import in_place_target, is_mcap
 from .text import seconds, table
+from .verbs import Place, verb
 
 _AFTER = re.compile(r"^(?:(?P<h>\d+)h)?(?:(?P<m>\d+)m(?!s))?(?:(?P<value>\d+(?:\.\d+)?)(?P<unit>ms|us|ns|s)?)?$")
 _UNITS = {"s": 10**9, "ms": 10**6, "us": 10**3, "ns": 1}
@@ -111,68 +109,54 @@ def _dated(text: NoteText, start_ns: int) -> Note:
     return Note(at_ns, severity_of(text.severity), PERSON, text.text, end_ns)
 
 
-def annotate_one(path: Path, output: Path, *, add: Sequence[NoteText], remove: Sequence[int], force: bool) -> Annotated:
-    """Add and remove notes of one MCAP; nothing is written where nothing changes."""
-    if output != path:
-        check_target(output, path, force)
-    with open_log(path) as log:
-        _, notes = everything_said(log)
-        start_ns, end_ns = log.start_ns, log.end_ns
-    own = [note for note in notes if note.name == PERSON]
-    wrong = [number for number in remove if not 1 <= number <= len(own)]
-    if wrong:
-        raise InputError(f"{path}: there is no note {wrong[0]}; there are {len(own)} (attlog annotate {path} --list)")
-    kept = [note for number, note in enumerate(own, 1) if number not in remove]
-    fresh = [replace(note) for note in (_dated(text, start_ns) for text in add)]
-    outside = [note for note in fresh if not start_ns <= note.time_ns <= end_ns]
-    if outside:
-        raise InputError(f"{path}: {outside[0].text!r} is outside the log, which lasts {seconds(end_ns - start_ns)}")
-    mine = sorted([*kept, *fresh], key=lambda note: note.time_ns)
-    if add or remove or output != path:
-        everyone = [*(note for note in notes if note.name != PERSON), *mine]
-        columns = [notes_columns(everyone)] if everyone else []
-        output.parent.mkdir(parents=True, exist_ok=True)
-        storage.annotate(path, columns, remove={ANNOTATIONS}.__contains__, output=output)
-    return Annotated(str(path), str(output), tuple(mine), start_ns)
-
-
-@overload
-def annotate(source: str | Path, text: str | None = ..., **options: Any) -> Annotated: ...
-@overload
-def annotate(source: Iterable[str | Path], text: str | None = ..., **options: Any) -> Outcomes[Annotated]: ...
+@verb(is_mcap, in_place=True)
 def annotate(
-    source: str | Path | Iterable[str | Path],
+    source: Place,
     text: str | None = None,
     *,
     at: str | None = None,
     to: str | None = None,
     severity: str = "info",
-    notes: str | Path | None = None,
+    notes: Place | None = None,
     remove: Sequence[int] = (),
-    output: str | Path | None = None,
+    output: Place | None = None,
     force: bool = False,
-    jobs: int | None = None,
-    timeout_s: float = TIMEOUT_S,
-) -> Annotated | Outcomes[Annotated]:
+) -> Annotated:
     """Add a note at ``at`` (until ``to``) to an MCAP's ``/annotations``, or those of a CSV with at,to,severity,text.
 
     Times are written as ``12.3s`` or ``1m5s`` after the log's start or as a date with its zone. ``remove`` takes notes
     out by the number that the result lists them with. Without a text, a CSV and ``remove`` the notes are only listed.
-
-    One MCAP gives `Annotated`, or raises InputError or UsageError; a list gives `Outcomes`.
+    InputError where the file cannot be read or a note is outside of it, UsageError for what is no time or severity.
     """
+    add = _wanted(text, at, to, severity, notes)
+    path, target = Path(source), in_place_target(source, output, force)
+    with open_log(path) as log:
+        _, said = everything_said(log)
+        start_ns, end_ns = log.start_ns, log.end_ns
+    own = [note for note in said if note.name == PERSON]
+    fresh = [_dated(each, start_ns) for each in add]
+    _check(path, own, fresh, remove, (start_ns, end_ns))
+    kept = [note for number, note in enumerate(own, 1) if number not in remove]
+    mine = sorted([*kept, *fresh], key=lambda note: note.time_ns)
+    if add or remove or target != path:
+        everyone = [*(note for note in said if note.name != PERSON), *mine]
+        columns = [notes_columns(everyone)] if everyone else []
+        storage.annotate(path, columns, remove={ANNOTATIONS}.__contains__, output=target)
+    return Annotated(str(path), str(target), tuple(mine), start_ns)
+
+
+def _wanted(text: str | None, at: str | None, to: str | None, severity: str, notes: Place | None) -> list[NoteText]:
     if (text is None) != (at is None):
         raise UsageError('a note needs both a text and a time: --at 12.3s "text"')
-    add = [NoteText(at, text, to, severity)] if text is not None and at is not None else []
-    add += notes_from_csv(notes) if notes is not None else []
     severity_of(severity)
-    settings: dict[str, Any] = {"add": add, "remove": tuple(remove), "force": force}
-    if isinstance(source, str | Path):
-        target = outputs([Path(source)], output)[0] if output is not None else Path(source)
-        return annotate_one(Path(source), target, **settings)
-    files = expand(source, is_mcap)
-    targets = outputs(files, output) if output is not None else files
-    pairs = zip(files, targets, strict=True)
-    return run_all(
-        [(str(file), partial(annotate_one, file, target, **settings)) for file, target in pairs], jobs or 1, timeout_s
-    )
+    single = [NoteText(at, text, to, severity)] if text is not None and at is not None else []
+    return [*single, *(notes_from_csv(notes) if notes is not None else [])]
+
+
+def _check(path: Path, own: list[Note], fresh: list[Note], remove: Sequence[int], span: tuple[int, int]) -> None:
+    wrong = [number for number in remove if not 1 <= number <= len(own)]
+    if wrong:
+        raise InputError(f"{path}: there is no note {wrong[0]}; there are {len(own)} (attlog annotate {path} --list)")
+    outside = [note for note in fresh if not span[0] <= note.time_ns <= span[1]]
+    if outside:
+        raise InputError(f"{path}: {outside[0].text!r} is outside the log, which lasts {seconds(span[1] - span[0])}")

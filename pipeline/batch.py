@@ -38,7 +38,7 @@ def _here(name: str, call: Callable[[], T]) -> Outcome[T]:
 def _in_pool(tasks: Sequence[Task[T]], workers: int, timeout_s: float) -> list[Outcome[T]]:
     from pebble import ProcessPool
 
-    pool = ProcessPool(max_workers=workers, context=multiprocessing.get_context("spawn"))
+    pool: Any = ProcessPool(max_workers=workers, context=multiprocessing.get_context("spawn"))
     try:
         futures = [(name, pool.schedule(call, timeout=timeout_s)) for name, call in tasks]
         outcomes = [_collect(name, future) for name, future in futures]

@@ -2,9 +2,8 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
-from typing import Any, Literal, overload
+from typing import Any, Literal
 
 from .. import ingest, storage
 from ..schemas import records
@@ -14,14 +13,13 @@ from ..schemas.finding import Finding
 from ..schemas.recording import Recording, Segment
 from ..schemas.sensors import SensorProfile, profile
 from ..schemas.source import Completeness, Ingested, IngestOptions, Source
-from .batch import TIMEOUT_S, run_all
 from .bodies import bodies_columns
 from .findings import both
-from .inputs import check_target, expand, head_of, is_mcap, outputs
-from .outcomes import Outcomes
+from .inputs import check_target, head_of, is_mcap, outputs
 from .provenance import software
 from .recordings import recordings
 from .text import count, moment, seconds
+from .verbs import Place, verb
 
 
 @dataclass(frozen=True)
@@ -167,20 +165,6 @@ def summary(source: Source, ingested: Ingested, output: Path, columns: Iterable[
     )
 
 
-def convert_one(path: Path, output: Path, *, options: IngestOptions, compression: str, force: bool) -> Conversion:
-    """Convert one file; InputError or StorageError say why not."""
-    head_of(path)
-    check_target(output, path, force)
-    source, ingested = read_source(path, options)
-    metadata = metadata_records(source, ingested)
-    vehicles = ingested_recordings(ingested, metadata)
-    viewed = bodies_columns(list(vehicles.values()))
-    columns = [*ingested.columns, *viewed, *both(ingested.findings, ingested.notes)]
-    output.parent.mkdir(parents=True, exist_ok=True)
-    storage.write(output, columns, metadata=metadata, compression=compression, force=force)
-    return summary(source, ingested, output, columns)
-
-
 def is_log(path: Path) -> bool:
     """Whether some ingestor takes the file; how folders are searched."""
     try:
@@ -190,38 +174,31 @@ def is_log(path: Path) -> bool:
     return not is_mcap(path)
 
 
-@overload
-def convert(source: str | Path, output: str | Path | None = ..., **options: Any) -> Conversion: ...
-@overload
-def convert(source: Iterable[str | Path], output: str | Path | None = ..., **options: Any) -> Outcomes[Conversion]: ...
+@verb(is_log)
 def convert(
-    source: str | Path | Iterable[str | Path],
-    output: str | Path | None = None,
+    source: Place,
+    output: Place | None = None,
     *,
     vehicle: int | Literal["all"] | None = None,
     sensor: str | SensorProfile | None = None,
     dialect: str = "ardupilotmega",
     compression: str = "zstd",
     force: bool = False,
-    jobs: int | None = None,
-    timeout_s: float = TIMEOUT_S,
-) -> Conversion | Outcomes[Conversion]:
+) -> Conversion:
     """Turn a log into an MCAP: every message of the source, and the unified channels of its sensors and attitudes.
 
-    ``source`` is one log, or a list of files, folders and globs. ``output`` is a file, or a folder; without it the MCAP
-    is written beside the log. ``vehicle`` is the system id whose topics have no prefix ("all": every vehicle has one);
-    ``sensor`` a profile (name or `SensorProfile`) for a source of raw counts; ``compression`` zstd, lz4 or none.
-
-    One log gives its `Conversion`, or raises InputError or StorageError; a list gives `Outcomes`.
+    ``output`` is a file, or a folder; without it the MCAP is written beside the log. ``vehicle`` is the system id whose
+    topics have no prefix ("all": every vehicle has one); ``sensor`` a profile (name or `SensorProfile`) for a source of
+    raw counts; ``compression`` zstd, lz4 or none. InputError or StorageError where it cannot be done.
     """
-    settings: dict[str, Any] = {
-        "options": ingest_options(vehicle, sensor, dialect),
-        "compression": compression,
-        "force": force,
-    }
-    if isinstance(source, str | Path):
-        return convert_one(Path(source), outputs([Path(source)], output)[0], **settings)
-    files = expand(source, is_log)
-    pairs = zip(files, outputs(files, output), strict=True)
-    tasks = [(str(file), partial(convert_one, file, target, **settings)) for file, target in pairs]
-    return run_all(tasks, jobs, timeout_s)
+    path = Path(source)
+    target = outputs([path], output)[0]
+    check_target(target, path, force)
+    log, ingested = read_source(path, ingest_options(vehicle, sensor, dialect))
+    metadata = metadata_records(log, ingested)
+    vehicles = ingested_recordings(ingested, metadata)
+    viewed = bodies_columns(list(vehicles.values()))
+    columns = [*ingested.columns, *viewed, *both(ingested.findings, ingested.notes)]
+    target.parent.mkdir(parents=True, exist_ok=True)
+    storage.write(target, columns, metadata=metadata, compression=compression, force=force)
+    return summary(log, ingested, target, columns)

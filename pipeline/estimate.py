@@ -1,11 +1,10 @@
 """Attitude estimates of a recording, added to its MCAP."""
 
 import dataclasses
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
-from typing import Any, overload
+from typing import Any
 
 from .. import estimators, storage
 from ..schemas.columns import Columns
@@ -14,16 +13,15 @@ from ..schemas.estimate import Estimate, North
 from ..schemas.finding import Finding
 from ..schemas.recording import Recording
 from ..schemas.unified import estimate_columns
-from .batch import TIMEOUT_S, run_all
 from .bodies import BODIES, TF, bodies_columns
 from .convert import finding_lines
 from .declination import with_declination
 from .findings import ANNOTATIONS, FINDINGS, both, findings_from, notes_from, replaced
-from .inputs import check_target, expand, is_mcap, outputs
-from .outcomes import Outcomes
+from .inputs import in_place_target, is_mcap
 from .provenance import made_from
 from .recordings import is_recorded, recordings
 from .text import table
+from .verbs import Place, verb
 
 WITH_MAGNETOMETER = ("ecf", "ekf9", "gyro")
 WITHOUT_MAGNETOMETER = ("ecf", "ekf6", "gyro")
@@ -60,8 +58,7 @@ class Estimation:
         rows = [(m.topic, f"{m.samples:,}", m.north, f"{m.declination_deg:.1f}", " ".join(m.inputs)) for m in self.made]
         lines = [self.output, table(("estimate", "samples", "north", "declination [deg]", "inputs"), rows, (1, 3))]
         lines += [f"skipped {name}: {reason}" for name, reason in self.skipped.items()]
-        for made in self.made:
-            lines += finding_lines(made.findings, self.start_ns)
+        lines += finding_lines(dict.fromkeys(f for made in self.made for f in made.findings), self.start_ns)
         return "\n".join(lines)
 
     def to_dict(self) -> dict[str, Any]:
@@ -168,29 +165,6 @@ def everything_said(log: storage.LogFile) -> tuple[list[Finding], list[Any]]:
     return findings_from(said.get(FINDINGS)), notes_from(said.get(ANNOTATIONS))
 
 
-def estimate_one(
-    path: Path, output: Path, *, selected: Sequence[str] | None, declination_deg: float | None, force: bool
-) -> Estimation:
-    """Estimate on one MCAP, in place where ``output`` is the file itself."""
-    if output != path:
-        check_target(output, path, force)
-    with open_log(path) as log:
-        vehicles = read_recordings(log)
-        findings, notes = everything_said(log)
-        start_ns = log.start_ns
-    done = estimate_vehicles(path, vehicles, selected, declination_deg)
-    columns = [channel for each in done for channel in each.columns()]
-    remade = {channel.channel.topic for channel in columns}
-    new = [finding for each in done for finding in each.findings]
-    columns += both(replaced(findings, new, remade.__contains__), notes)
-    columns += bodies_columns([each.recording for each in done])
-    output.parent.mkdir(parents=True, exist_ok=True)
-    storage.annotate(path, columns, remove={TF, BODIES, FINDINGS, ANNOTATIONS}.__contains__, output=output)
-    made = tuple(m for each in done for m in each.made())
-    skipped = {f"{each.recording.prefix}{name}": why for each in done for name, why in each.skipped.items()}
-    return Estimation(str(path), str(output), made, skipped, start_ns)
-
-
 def estimate_vehicles(
     path: Path, vehicles: Mapping[str, Recording], selected: Sequence[str] | None, declination_deg: float | None
 ) -> list[Estimated]:
@@ -209,37 +183,39 @@ def _untouched(recording: Recording) -> Estimated:
     return Estimated(recording, (), {}, ())
 
 
-@overload
-def estimate(source: str | Path, estimators: Sequence[str] | None = ..., **options: Any) -> Estimation: ...
-@overload
+@verb(is_mcap, in_place=True)
 def estimate(
-    source: Iterable[str | Path], estimators: Sequence[str] | None = ..., **options: Any
-) -> Outcomes[Estimation]: ...
-def estimate(
-    source: str | Path | Iterable[str | Path],
+    source: Place,
     estimators: Sequence[str] | None = None,
     *,
     declination: float | None = None,
-    output: str | Path | None = None,
+    output: Place | None = None,
     force: bool = False,
-    jobs: int | None = None,
-    timeout_s: float = TIMEOUT_S,
-) -> Estimation | Outcomes[Estimation]:
+) -> Estimation:
     """Estimate the attitude from the sensors of an MCAP and add each estimate as ``/estimate/{name}/attitude``.
 
     ``estimators`` are names with parameters, as ``"ecf:imu=1,kp=0.3,as=soft"``; by default ecf, ekf9 and gyro, or ecf,
     ekf6 and gyro without a magnetometer. ``declination`` in degrees, east positive, overrides what the log knows. The
-    file is annotated in place, or copied to ``output``. An estimate of the same name is replaced.
-
-    One MCAP gives its `Estimation`, or raises InputError; a list of files, folders and globs gives `Outcomes`.
+    file is annotated in place, or copied to ``output``. An estimate of the same name is replaced. InputError where the
+    file cannot be read or nothing could be estimated, UsageError for an unknown estimator or parameter.
     """
-    settings: dict[str, Any] = {"selected": estimators, "declination_deg": declination, "force": force}
-    if isinstance(source, str | Path):
-        target = outputs([Path(source)], output)[0] if output is not None else Path(source)
-        return estimate_one(Path(source), target, **settings)
-    files = expand(source, is_mcap)
-    targets = outputs(files, output) if output is not None else files
-    pairs = zip(files, targets, strict=True)
-    return run_all(
-        [(str(file), partial(estimate_one, file, target, **settings)) for file, target in pairs], jobs, timeout_s
-    )
+    path, target = Path(source), in_place_target(source, output, force)
+    with open_log(path) as log:
+        vehicles = read_recordings(log)
+        findings, notes = everything_said(log)
+        start_ns = log.start_ns
+    done = estimate_vehicles(path, vehicles, estimators, declination)
+    columns = [channel for each in done for channel in each.columns()]
+    remade = {channel.channel.topic for channel in columns}
+    new = [finding for each in done for finding in each.findings]
+    columns += both(replaced(findings, new, remade.__contains__), notes)
+    columns += bodies_columns([each.recording for each in done])
+    storage.annotate(path, columns, remove={TF, BODIES, FINDINGS, ANNOTATIONS}.__contains__, output=target)
+    return estimation(path, target, done, start_ns)
+
+
+def estimation(source: Path, output: Path, done: Sequence[Estimated], start_ns: int) -> Estimation:
+    """The result for all vehicles of a log."""
+    made = tuple(m for each in done for m in each.made())
+    skipped = {f"{each.recording.prefix}{name}": why for each in done for name, why in each.skipped.items()}
+    return Estimation(str(source), str(output), made, skipped, start_ns)

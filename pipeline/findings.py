@@ -1,6 +1,6 @@
 """Findings and notes as the channels ``/findings`` and ``/annotations``, and back."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 
 import numpy as np
 
@@ -103,14 +103,14 @@ def mirror(finding: Finding) -> Note:
     return Note(finding.time_ns, finding.severity, f"{MIRROR}{finding.kind}", text, end)
 
 
-def both(findings: Sequence[Finding], notes: Iterable[Note]) -> list[Columns]:
-    """``/findings`` and ``/annotations``, each where it has a message; old mirrors among ``notes`` are left out."""
+def both(findings: Iterable[Finding], notes: Iterable[Note]) -> list[Columns]:
+    """``/findings`` (none twice) and ``/annotations``, each where it has a message; old mirrors among ``notes`` go."""
     said = [note for note in notes if not note.name.startswith(MIRROR)]
-    made = [findings_columns(findings), notes_columns([*said, *map(mirror, findings)])]
+    distinct = list(dict.fromkeys(findings))
+    made = [findings_columns(distinct), notes_columns([*said, *map(mirror, distinct)])]
     return [columns for columns in made if len(columns)]
 
 
 def replaced(existing: Iterable[Finding], new: Iterable[Finding], is_remade: Callable[[str], bool]) -> list[Finding]:
-    """The findings after a channel was made anew: its old ones give way, and none is there twice."""
-    kept = [finding for finding in existing if not is_remade(finding.topic)]
-    return list(dict.fromkeys([*kept, *new]))
+    """The findings after a channel was made anew: its old ones give way."""
+    return [*(finding for finding in existing if not is_remade(finding.topic)), *new]

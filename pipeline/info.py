@@ -1,20 +1,18 @@
 """What is in an MCAP."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
-from typing import Any, overload
+from typing import Any
 
 from .. import storage
 from ..schemas import records
 from ..schemas.recording import Segment
-from .batch import TIMEOUT_S, run_all
 from .convert import completeness_text, segment_lines
 from .estimate import open_log
-from .inputs import expand, is_mcap
-from .outcomes import Outcomes
+from .inputs import is_mcap
 from .text import count, moment, seconds, table
+from .verbs import Place, verb
 
 
 @dataclass(frozen=True)
@@ -85,8 +83,21 @@ def _rate(rate_hz: float | None) -> str:
     return "-" if rate_hz is None else f"{rate_hz:.2f}"
 
 
-def info_one(path: Path) -> Info:
-    """Read what one MCAP says of itself."""
+def _channel(log: storage.LogFile, topic: str) -> ChannelSummary:
+    about = log.topics[topic]
+    channel = about.channel
+    span = about.end_ns - about.start_ns
+    rate = (about.count - 1) / span * 1e9 if about.count > 1 and span > 0 else None
+    return ChannelSummary(topic, about.schema_name, about.count, rate, channel.metadata)
+
+
+@verb(is_mcap, writes=False)
+def info(source: Place) -> Info:
+    """Topics, types, counts, rates, time span, source and completeness of an MCAP, whoever wrote it.
+
+    InputError where it cannot be read.
+    """
+    path = Path(source)
     with open_log(path) as log:
         return Info(
             source=str(path),
@@ -99,27 +110,3 @@ def info_one(path: Path) -> Info:
             segments=records.parse_segments(log.metadata.get(records.SEGMENTS, {})),
             metadata=log.metadata,
         )
-
-
-def _channel(log: storage.LogFile, topic: str) -> ChannelSummary:
-    about = log.topics[topic]
-    channel = about.channel
-    span = about.end_ns - about.start_ns
-    rate = (about.count - 1) / span * 1e9 if about.count > 1 and span > 0 else None
-    return ChannelSummary(topic, about.schema_name, about.count, rate, channel.metadata)
-
-
-@overload
-def info(source: str | Path) -> Info: ...
-@overload
-def info(source: Iterable[str | Path], *, jobs: int | None = ..., timeout_s: float = ...) -> Outcomes[Info]: ...
-def info(
-    source: str | Path | Iterable[str | Path], *, jobs: int | None = None, timeout_s: float = TIMEOUT_S
-) -> Info | Outcomes[Info]:
-    """Topics, types, counts, rates, time span, source and completeness of an MCAP, whoever wrote it.
-
-    One MCAP gives its `Info`, or raises InputError; a list of files, folders and globs gives `Outcomes`.
-    """
-    if isinstance(source, str | Path):
-        return info_one(Path(source))
-    return run_all([(str(file), partial(info_one, file)) for file in expand(source, is_mcap)], jobs or 1, timeout_s)

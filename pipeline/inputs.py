@@ -90,3 +90,13 @@ def check_target(target: Path, source: Path | None, force: bool) -> None:
         raise StorageError(f"{target}: is the source itself; give another name with -o")
     if target.exists() and not force:
         raise StorageError(f"{target}: exists already; give --force to replace it, or another name with -o")
+
+
+def in_place_target(source: str | Path, output: str | Path | None, force: bool) -> Path:
+    """Where an annotated MCAP goes: the file itself, or ``output``, which is checked as by `check_target`."""
+    path = Path(source)
+    target = path if output is None else outputs([path], output)[0]
+    if target != path:
+        check_target(target, path, force)
+        target.parent.mkdir(parents=True, exist_ok=True)
+    return target

@@ -3,7 +3,7 @@
 from collections.abc import Collection
 from importlib.metadata import version
 
-from ..schemas.recording import Recording
+from ..schemas.recording import Imu, Magnetometer, Recording
 
 
 def software() -> str:
@@ -13,6 +13,6 @@ def software() -> str:
 
 def made_from(recording: Recording, topics: Collection[str]) -> dict[str, str]:
     """``software``, and ``input.{topic}`` -> content hash of each sensor channel of ``recording`` that is named."""
-    channels = [*recording.imu.values(), *recording.mag.values()]
+    channels: list[Imu | Magnetometer] = [*recording.imu.values(), *recording.mag.values()]
     inputs = {f"input_sha256.{c.topic}": c.sha256 for c in channels if c.topic in topics}
     return {"software": software(), **inputs}

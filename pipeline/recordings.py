@@ -77,8 +77,10 @@ def _mag(columns: Columns, _: str) -> Magnetometer:
 
 def _fix(columns: Columns, _: str) -> Fix:
     fixed = columns.select(columns.data["status"]["status"] >= 0)
-    place = (np.asarray(fixed.data[name], dtype=np.float64) for name in ("latitude", "longitude", "altitude"))
-    return Fix(fixed.time_ns, *place, columns.channel.topic, columns.channel.metadata)
+    latitude, longitude, altitude = (
+        np.asarray(fixed.data[name], dtype=np.float64) for name in ("latitude", "longitude", "altitude")
+    )
+    return Fix(fixed.time_ns, latitude, longitude, altitude, columns.channel.topic, columns.channel.metadata)
 
 
 def _attitude(columns: Columns, name: str) -> Attitude:

@@ -39,7 +39,8 @@ def test_findings_are_mirrored_once() -> None:
 
 def test_a_remade_channels_findings_give_way() -> None:
     new = Finding(5, 6, Severity.WARN, Kind.RESET, "/estimate/ecf/attitude", 1.0, "", "again")
-    assert replaced([GAP, RESET], [new, GAP], "/estimate/ecf/attitude".__eq__) == [GAP, new]
+    left = replaced([GAP, RESET], [new, GAP], "/estimate/ecf/attitude".__eq__)
+    assert findings_from(both(left, [])[0]) == [new, GAP]
 
 
 @pytest.mark.parametrize(

@@ -30,7 +30,7 @@ def test_a_glob_gives_its_matches_and_nothing_twice(tmp_path: Path) -> None:
 def test_a_named_file_is_kept_whatever_it_is(tmp_path: Path) -> None:
     (text,) = _touch(tmp_path, "notes[1].txt")
     missing = tmp_path / "missing.mcap"
-    assert expand([text, missing, str(tmp_path / "no*")], is_mcap) == [text, missing, tmp_path / "no*"]
+    assert expand([text, missing, str(tmp_path / "nil*")], is_mcap) == [text, missing, tmp_path / "nil*"]
 
 
 def test_results_lie_beside_their_sources(tmp_path: Path) -> None:

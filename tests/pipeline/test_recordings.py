@@ -92,7 +92,7 @@ def test_bodies_stand_side_by_side_at_25_hz() -> None:
     tf, bodies = bodies_columns([Recording(reference=attitude, onboard={"att": attitude})])
     assert 2 * 249 <= len(tf) <= 2 * 250
     inner = tf["transforms"][:, 0]
-    places = {name: x for name, x in zip(inner["child_frame_id"], inner["transform"]["translation"]["x"], strict=True)}
+    places = dict(zip(inner["child_frame_id"], inner["transform"]["translation"]["x"], strict=True))
     assert places == {b"reference": 0.0, b"onboard_att": SPACING_M}
     assert np.all(inner["transform"]["rotation"]["w"] == 1.0)
     markers = bodies["markers"][0]

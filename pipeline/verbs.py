@@ -1,0 +1,84 @@
+"""What makes a call on one log a verb: given a list, it does every log, each on its own."""
+
+import functools
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any, Concatenate, Generic, ParamSpec, TypeVar, overload
+
+from .batch import TIMEOUT_S, run_all
+from .inputs import expand, outputs
+from .outcomes import Outcomes, Result
+
+P = ParamSpec("P")
+T = TypeVar("T", bound=Result)
+Place = str | Path
+
+
+class Verb(Generic[P, T]):
+    """A call on one log. One log gives its result or raises; a list of files, folders and globs gives `Outcomes`.
+
+    ``accepts`` says which files of a folder it takes; ``writes`` whether it has an ``output``; ``in_place`` whether
+    that is the log itself unless another is named.
+    """
+
+    def __init__(
+        self,
+        one: Callable[Concatenate[Place, P], T],
+        accepts: Callable[[Path], bool],
+        in_place: bool,
+        writes: bool,
+    ) -> None:
+        self.one = one
+        self.accepts = accepts
+        self.in_place = in_place
+        self.writes = writes
+        functools.update_wrapper(self, one)
+
+    @overload
+    def __call__(self, source: Place, /, *args: P.args, **options: P.kwargs) -> T: ...  # type: ignore[overload-overlap]
+    @overload
+    def __call__(self, source: Iterable[Place], /, *args: P.args, **options: P.kwargs) -> Outcomes[T]: ...
+    def __call__(self, source: Place | Iterable[Place], /, *args: P.args, **options: P.kwargs) -> T | Outcomes[T]:
+        """Do one log, or each of a list."""
+        if isinstance(source, str | Path):
+            return self.one(source, *args, **options)
+        return for_each(self, source, *args, **options)  # type: ignore[arg-type]
+
+    def __reduce__(self) -> str:
+        return str(self.one.__qualname__)  # workers find it by name
+
+    def targets(self, files: list[Path], output: Place | None) -> list[dict[str, Path]]:
+        """The argument that says where each file's result goes."""
+        if not self.writes:
+            return [{} for _ in files]
+        places = files if self.in_place and output is None else outputs(files, output)
+        return [{"output": place} for place in places]
+
+
+def verb(
+    accepts: Callable[[Path], bool], *, in_place: bool = False, writes: bool = True
+) -> Callable[[Callable[Concatenate[Place, P], T]], Verb[P, T]]:
+    """Make a call on one log a `Verb`."""
+    return lambda one: Verb(one, accepts, in_place, writes)
+
+
+def for_each(
+    call: Verb[Any, T],
+    sources: Iterable[Place],
+    *args: Any,
+    output: Place | None = None,
+    jobs: int | None = None,
+    timeout_s: float = TIMEOUT_S,
+    **options: Any,
+) -> Outcomes[T]:
+    """Do every log that ``sources`` (files, folders, globs) name, at most ``jobs`` at once, each at most ``timeout_s``.
+
+    ``output`` is a folder, or a file where there is one log; ``args`` and ``options`` are those of ``call``. One log
+    that fails, dies or hangs stops no other.
+    """
+    files = expand(sources, call.accepts)
+    tasks = [
+        (str(file), functools.partial(call, file, *args, **target, **options))
+        for file, target in zip(files, call.targets(files, output), strict=True)
+    ]
+    return run_all(tasks, jobs, timeout_s)
