@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .definition import MessageType
+from .passthrough import source_names
 
 Time = NDArray[np.int64]
 """Integer nanoseconds, shape (n,)."""
@@ -46,7 +47,12 @@ class Columns:
         return len(self.time_ns)
 
     def __getitem__(self, name: str) -> NDArray[Any]:
-        return self.data[name]
+        """A field, by its ROS name or the source's own (``gyrx`` or ``GyrX``)."""
+        known = self.data.dtype.names or ()
+        field = name if name in known else source_names(self.channel.type).get(name, name)
+        if field not in known:
+            raise KeyError(f"{self.channel.topic} has no field {name!r}; it has {', '.join(known)}")
+        return self.data[field]
 
     def select(self, index: Any) -> "Columns":
         """The messages that ``index`` (a slice, a mask or positions) picks."""
