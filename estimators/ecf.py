@@ -41,7 +41,8 @@ class Parameters(MargParameters):
     ki: float = quantity(0.05, "1/s^2", "gain of the bias, times k_acc and k_mag")
     k_acc: float = quantity(0.3, "", "weight of the accelerometer")
     k_mag: float = quantity(0.3, "", "weight of the magnetometer")
-    gate: float = quantity(2.0, "m/s^2", "excess over gravity at which the accelerometer counts half", minimum=1e-6)
+    gate: float = quantity(2.0, "m/s^2", "recent acceleration at which the accelerometer counts half", minimum=1e-6)
+    motion_s: float = quantity(1.0, "s", "how long an acceleration counts as recent", minimum=1e-3)
     heading_only: bool = choice(True, "the magnetometer turns about the vertical only")
 
 
@@ -60,11 +61,12 @@ def run(recording: Recording, parameters: Parameters) -> Estimate:
             parameters.k_acc,
             parameters.k_mag,
             GRAVITY,
-            1.0 / parameters.gate,
+            1.0 / parameters.gate**2,
+            1.0 / parameters.motion_s,
             m0,
             parameters.heading_only,
         )
-        return constants, (start.orientation, start.bias)
+        return constants, (start.orientation, start.bias, 0.0)
 
     each_run(inputs, ecf_kernel.run, begin, output, mag=True)
     return result("ecf", inputs, dict(zip(("orientation", "angular_velocity", "gyro_bias"), output, strict=True)))

@@ -9,9 +9,9 @@ from ..geometry.jit import kernel, part
 from ..geometry.kernels import Quaternion, Vector, cross, exponential, matrix, multiply, norm, renormalize, turned
 from ..geometry.kernels import turned_back
 from ..schemas.estimate import Status
-from .loop import Floats, Span, Times, march
+from .loop_kernel import Floats, Span, Times, march
 
-State = tuple[Quaternion, Vector]
+State = tuple[Quaternion, Vector, float]
 Output = tuple[Floats, Floats, Floats]
 
 ACCELEROMETER_REJECTED = int(Status.ACCELEROMETER_REJECTED)
@@ -27,6 +27,7 @@ class Constants(NamedTuple):
     k_mag: float
     gravity: float
     gate: float
+    motion_rate: float
     m0: Vector
     heading_only: bool
 
@@ -36,14 +37,17 @@ def step(
     c: Constants, state: State, dt: float, rate: Vector, force: Vector, dt_mag: float, field: Vector
 ) -> tuple[State, Vector, int]:
     """Sample k: w_mes from the attitude of k - 1, then R_k = R_k-1 Exp((gyro - b + kp w_mes) dt)."""
-    q, b = state
+    q, b, motion = state
     rotation = matrix(q)
     up = (rotation[6], rotation[7], rotation[8])  # v_hat of gravity: R^T e_z
     wx = wy = wz = 0.0  # w_mes, times the interval of the sensor that it comes from
     length = norm(force)
     if length > 0.0:
-        excess = (length - c.gravity) * c.gate
-        weight = c.k_acc * dt / (length * (1.0 + excess * excess))
+        weight = c.k_acc * dt / length
+        if c.gate > 0.0:
+            x, y, z = force[0] - c.gravity * up[0], force[1] - c.gravity * up[1], force[2] - c.gravity * up[2]
+            motion += min(c.motion_rate * dt, 1.0) * ((x * x + y * y + z * z) * c.gate - motion)
+            weight = c.k_acc * dt / (c.gravity * (1.0 + motion))
         e = cross(force, up)
         wx, wy, wz = weight * e[0], weight * e[1], weight * e[2]
     if dt_mag > 0.0:
@@ -60,13 +64,13 @@ def step(
     u = (rate[0] - b[0], rate[1] - b[1], rate[2] - b[2])
     turn = exponential(u[0] * dt + c.kp * wx, u[1] * dt + c.kp * wy, u[2] * dt + c.kp * wz)
     b = (b[0] - c.ki * wx, b[1] - c.ki * wy, b[2] - c.ki * wz)
-    return (multiply(renormalize(q), turn), b), u, 0
+    return (multiply(renormalize(q), turn), b, motion), u, 0
 
 
 @part
 def write(output: Output, k: int, c: Constants, state: State, u: Vector) -> None:
     orientation, angular_velocity, gyro_bias = output
-    q, b = state
+    q, b, _ = state
     for i in range(4):
         orientation[k, i] = q[i]
     for i in range(3):

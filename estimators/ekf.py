@@ -51,12 +51,15 @@ INNOVATION_NAMES = ("tilt_east", "tilt_north", "heading")
 class Noise(ImuParameters):
     """Noise of gyro and accelerometer, and what is known of the bias at the start."""
 
-    gyro_noise: float = quantity(0.002, "rad/s/rtHz", "density of the gyro's noise")
-    bias_walk: float = quantity(0.00005, "rad/s/rts", "random walk of the gyro's bias")
+    gyro_lag_s: float = quantity(0.002, "s", "delay of the gyro's own filters, made up for")
+    gyro_noise: float = quantity(0.0015, "rad/s/rtHz", "density of the gyro's noise")
+    bias_walk: float = quantity(0.0001, "rad/s/rts", "random walk of the gyro's bias")
     bias_sigma: float = quantity(0.02, "rad/s", "bias at the start, where no rest shows it")
     rate_error: float = quantity(0.1, "", "share of a step's rate change that is error")
-    acc_noise: float = quantity(0.5, "m/s^2/rtHz", "density of linear acceleration", minimum=1e-9)
-    acc_excess: float = quantity(0.3, "1/rtHz", "more of it per m/s^2 off gravity")
+    scale_error: float = quantity(0.007, "1/rtHz", "gyro noise per rad/s of turning: scale and misalignment")
+    acc_noise: float = quantity(0.2, "m/s^2/rtHz", "density of linear acceleration", minimum=1e-9)
+    acc_motion: float = quantity(0.5, "1/rtHz", "more of it per m/s^2 of recent acceleration")
+    motion_s: float = quantity(1.0, "s", "how long an acceleration counts as recent", minimum=1e-3)
 
 
 @dataclass(frozen=True)
@@ -68,9 +71,9 @@ class Ekf6(Noise):
 class Ekf9(Noise, MargParameters):
     """Nine axes."""
 
-    mag_noise: float = quantity(0.1, "rad/rtHz", "density of the heading's noise", minimum=1e-9)
-    mag_excess: float = quantity(3.0, "rad/rtHz", "more of it per relative difference from the usual field")
-    mag_memory_s: float = quantity(60.0, "s", "time over which the usual field is learnt", minimum=1e-3)
+    mag_noise: float = quantity(0.04, "rad/rtHz", "density of the heading's noise", minimum=1e-9)
+    mag_excess: float = quantity(6.0, "rad/rtHz", "more of it per relative difference from the usual field")
+    mag_memory_s: float = quantity(120.0, "s", "time over which the usual field is learnt", minimum=1e-3)
 
 
 def run_ekf9(recording: Recording, parameters: Ekf9) -> Estimate:
@@ -86,7 +89,7 @@ def run_ekf6(recording: Recording, parameters: Ekf6) -> Estimate:
 
 def _run(name: str, inputs: Inputs, noise: Noise, field: tuple[float, float, float]) -> Estimate:
     from .ekf_kernel import Constants, State
-    from .ekf_output import run
+    from .ekf_output_kernel import run
 
     measured = 3 if inputs.has_mag else 2
     widths = {**WIDTHS, "innovation": measured, "innovation_covariance": measured * measured}
@@ -97,12 +100,15 @@ def _run(name: str, inputs: Inputs, noise: Noise, field: tuple[float, float, flo
     def begin(start: Start) -> tuple[Constants, State]:
         level, vertical, strength2 = _usual(start)
         constants = Constants(
+            lag=noise.gyro_lag_s,
             gyro=noise.gyro_noise**2,
             bias_walk=noise.bias_walk**2,
             rate_error=noise.rate_error**2,
+            scale_error=noise.scale_error**2,
             force=(noise.acc_noise / GRAVITY) ** 2,
-            force_excess=(noise.acc_excess / GRAVITY) ** 2,
-            gravity=GRAVITY,
+            force_motion=noise.acc_motion**2,
+            per_gravity=1.0 / GRAVITY,
+            motion_rate=1.0 / noise.motion_s,
             field=mag_noise**2,
             field_excess=mag_excess**2,
             per_strength2=1.0 / strength2,
@@ -110,7 +116,7 @@ def _run(name: str, inputs: Inputs, noise: Noise, field: tuple[float, float, flo
             north=(math.sin(declination), math.cos(declination)),
         )
         none = (0.0, 0.0, 0.0)
-        return constants, State(start.orientation, start.bias, none, _covariance(start, noise), level, vertical)
+        return constants, State(start.orientation, start.bias, none, _covariance(start, noise), 0.0, level, vertical)
 
     each_run(inputs, run, begin, output, mag=True)
     filled = dict(zip(widths, output, strict=True))

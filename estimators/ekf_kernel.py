@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from ..geometry.jit import part
 from ..geometry.kernels import Matrix, Quaternion, Vector, exponential, matrix, multiply, norm, renormalize, turned
 from ..schemas.estimate import Status
-from .gyro_kernel import mean_turn
-from .loop import Floats, Span, Times, march
+from .gyro_kernel import interval_turn
+from .loop_kernel import Floats, Span, Times, march
 
 Symmetric: TypeAlias = tuple[float, float, float, float, float, float]
 Covariance: TypeAlias = tuple[Symmetric, Matrix, Symmetric]
@@ -27,12 +27,15 @@ MAGNETOMETER_REJECTED = int(Status.MAGNETOMETER_REJECTED)
 class Constants(NamedTuple):
     """Noise as densities squared (per Hz); ``north`` is the horizontal unit vector of the field, east and north."""
 
+    lag: float
     gyro: float
     bias_walk: float
     rate_error: float
+    scale_error: float
     force: float
-    force_excess: float
-    gravity: float
+    force_motion: float
+    per_gravity: float
+    motion_rate: float
     field: float
     field_excess: float
     per_strength2: float
@@ -41,12 +44,13 @@ class Constants(NamedTuple):
 
 
 class State(NamedTuple):
-    """After a sample; ``horizontal`` and ``vertical`` are the field that the filter has come to know."""
+    """After a sample; ``motion`` is the mean square of acceleration, in g; ``horizontal`` and ``vertical`` are the field that the filter has come to know."""
 
     q: Quaternion
     b: Vector
     rate: Vector
     P: Covariance
+    motion: float
     horizontal: float
     vertical: float
 
@@ -116,21 +120,6 @@ def condition(
 
 
 @part
-def tilt_innovation(force: Vector) -> tuple[float, float]:
-    """The world rotation about east and north that brings a unit vector onto the vertical; exact at any angle."""
-    x, y, z = force
-    square = x * x + y * y
-    if z > 0.0 and square < 0.003:  # angle over sine, to 1e-10
-        scale = 1.0 + square * (1 / 6 + square * (3 / 40 + square * (15 / 336)))
-        return y * scale, -x * scale
-    sine = math.sqrt(square)
-    if sine == 0.0:
-        return math.pi, 0.0
-    scale = math.atan2(sine, z) / sine
-    return y * scale, -x * scale
-
-
-@part
 def angle(y: float, x: float) -> float:
     """atan2(y, x), by its series where that is exact to 1e-13 and ten times faster."""
     t = y / x if x > 0.0 else 1.0
@@ -144,30 +133,33 @@ def angle(y: float, x: float) -> float:
 def step(
     c: Constants, state: State, dt: float, rate: Vector, force: Vector, dt_mag: float, field: Vector
 ) -> tuple[State, Report, int]:
-    q, b, before, P, horizontal, vertical = state
+    q, b, before, P, motion, horizontal, vertical = state
     flags = 0
 
     # 1. predict: the mean of the interval's rates turns the attitude
     u = (rate[0] - b[0], rate[1] - b[1], rate[2] - b[2])
+    if dt == 0.0:
+        before = rate
     jump = ((rate[0] - before[0]) ** 2 + (rate[1] - before[1]) ** 2 + (rate[2] - before[2]) ** 2) * dt * dt
     old = (before[0] - b[0], before[1] - b[1], before[2] - b[2])
-    q = multiply(renormalize(q), mean_turn(old, u, dt))
+    q = multiply(renormalize(q), interval_turn(old, u, dt, c.lag))
     R = matrix(q)
-    P = predict(c, P, R, c.rate_error * jump, dt)
+    turning = (rate[0] * rate[0] + rate[1] * rate[1] + rate[2] * rate[2]) * dt
+    P = predict(c, P, R, c.rate_error * jump + c.scale_error * turning, dt)
     prior = P[0]
 
-    # 2. accelerometer: two angles about the world's east and north
+    # 2. accelerometer: two angles about the world's east and north, as noisy as the motion of the last second or so
     d = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     tilt_x = tilt_y = heading = np.nan
     noise_tilt = noise_heading = rate_noise = np.nan
-    length = norm(force)
-    if length > 0.0 and dt > 0.0:
-        per_s, unit = 1.0 / dt, 1.0 / length
+    if dt > 0.0:
+        per_s = 1.0 / dt
         rate_noise = c.gyro * per_s
         f = turned(R, force)
-        tilt_x, tilt_y = tilt_innovation((f[0] * unit, f[1] * unit, f[2] * unit))
-        excess = length - c.gravity
-        noise_tilt = (c.force + c.force_excess * excess * excess) * per_s
+        tilt_x, tilt_y, lift = f[1] * c.per_gravity, -f[0] * c.per_gravity, f[2] * c.per_gravity - 1.0
+        moved = max(tilt_x * tilt_x + tilt_y * tilt_y + lift * lift - (prior[0] + prior[3]), 0.0)
+        motion += min(c.motion_rate * dt, 1.0) * (moved - motion)
+        noise_tilt = (c.force + c.force_motion * motion) * per_s
         a, x, _ = P
         P, d = condition(P, (a[0], a[1], a[2], x[0], x[1], x[2]), a[0] + noise_tilt, tilt_x - d[0], d)
         a, x, _ = P
@@ -192,4 +184,4 @@ def step(
     q = multiply(exponential(d[0], d[1], d[2]), q)
     b = (b[0] + d[3], b[1] + d[4], b[2] + d[5])
     report = Report((tilt_x, tilt_y, heading), prior, (noise_tilt, noise_tilt, noise_heading), d, rate_noise)
-    return State(q, b, rate, P, horizontal, vertical), report, flags
+    return State(q, b, rate, P, motion, horizontal, vertical), report, flags

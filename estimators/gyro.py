@@ -1,8 +1,8 @@
 """Gyro integration from an initial alignment: what the angular rate alone knows.
 
-    q_k = q_k-1 * Exp((w_k-1 + w_k) dt / 2 + w_k-1 x w_k dt^2 / 12),    w = gyro - bias
+    q_k = q_k-1 * Exp((w_k-1 + w_k) dt / 2 + (w_k - w_k-1) lag + w_k-1 x w_k dt^2 / 12),    w = gyro - bias
 
-The second term is coning to the order that two samples allow (Savage, Strapdown Inertial Navigation Integration
+The second term makes up for the delay of the gyro's own filters, the third is coning to the order that two samples allow (Savage, Strapdown Inertial Navigation Integration
 Algorithm Design Part 1, J. Guidance 21(1), 1998, doi:10.2514/2.4228). Exact for a constant rate. The bias is that of
 the rest at the start, else 0; the magnetometer, where there is one, gives the first heading only.
 """
@@ -13,14 +13,16 @@ from ..schemas.estimate import Estimate
 from ..schemas.recording import Recording
 from .inputs import prepare
 from .output import block, result
-from .parameters import MargParameters
+from .parameters import MargParameters, quantity
 from .registry import Estimator
 from .runs import each_run
 
 
 @dataclass(frozen=True)
 class Parameters(MargParameters):
-    """Nothing to tune."""
+    """Nothing to tune but the gyro's delay."""
+
+    gyro_lag_s: float = quantity(0.002, "s", "delay of the gyro's own filters, made up for")
 
 
 def run(recording: Recording, parameters: Parameters) -> Estimate:
@@ -29,7 +31,7 @@ def run(recording: Recording, parameters: Parameters) -> Estimate:
 
     inputs = prepare(recording, parameters, mag=True)
     output = block(len(inputs.time_ns), [4, 3, 3])
-    each_run(inputs, gyro_kernel.run, lambda start: (None, (start.orientation, start.bias, NONE)), output, mag=False)
+    each_run(inputs, gyro_kernel.run, lambda start: (parameters.gyro_lag_s, (start.orientation, start.bias, NONE)), output, mag=False)
     return result("gyro", inputs, dict(zip(("orientation", "angular_velocity", "gyro_bias"), output, strict=True)))
 
 

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from ..geometry.jit import kernel, part
 from ..geometry.kernels import Quaternion, Vector, exponential, multiply, renormalize
-from .loop import Floats, Span, Times, march
+from .loop_kernel import Floats, Span, Times, march
 
 State = tuple[Quaternion, Vector, Vector]
 """Attitude, bias, and the rate at the sample before."""
@@ -16,26 +16,31 @@ Output = tuple[Floats, Floats, Floats]
 
 @part
 def step(
-    c: None, state: State, dt: float, rate: Vector, force: Vector, dt_mag: float, field: Vector
+    lag: float, state: State, dt: float, rate: Vector, force: Vector, dt_mag: float, field: Vector
 ) -> tuple[State, Vector, int]:
     q, b, before = state
     u = (rate[0] - b[0], rate[1] - b[1], rate[2] - b[2])
-    return (renormalize(multiply(q, mean_turn(before, u, dt))), b, u), u, 0
+    if dt == 0.0:
+        before = u
+    return (renormalize(multiply(q, interval_turn(before, u, dt, lag))), b, u), u, 0
 
 
 @part
-def mean_turn(a: Vector, b: Vector, dt: float) -> Quaternion:
-    """The turn over an interval at whose ends the rates are a and b: their mean, and the coning term dt^2/12 a x b."""
-    half, cone = 0.5 * dt, dt * dt / 12.0
+def interval_turn(a: Vector, b: Vector, dt: float, lag: float) -> Quaternion:
+    """The turn over an interval with measured rates a and b at its ends, of a gyro that lags behind by ``lag`` s.
+
+    Mean rate, its slope over the lag, and the coning term dt^2/12 a x b.
+    """
+    old, new, cone = 0.5 * dt - lag, 0.5 * dt + lag, dt * dt / 12.0
     return exponential(
-        half * (a[0] + b[0]) + cone * (a[1] * b[2] - a[2] * b[1]),
-        half * (a[1] + b[1]) + cone * (a[2] * b[0] - a[0] * b[2]),
-        half * (a[2] + b[2]) + cone * (a[0] * b[1] - a[1] * b[0]),
+        old * a[0] + new * b[0] + cone * (a[1] * b[2] - a[2] * b[1]),
+        old * a[1] + new * b[1] + cone * (a[2] * b[0] - a[0] * b[2]),
+        old * a[2] + new * b[2] + cone * (a[0] * b[1] - a[1] * b[0]),
     )
 
 
 @part
-def write(output: Output, k: int, c: None, state: State, u: Vector) -> None:
+def write(output: Output, k: int, lag: float, state: State, u: Vector) -> None:
     orientation, angular_velocity, gyro_bias = output
     q, b, _ = state
     for i in range(4):
@@ -47,7 +52,7 @@ def write(output: Output, k: int, c: None, state: State, u: Vector) -> None:
 
 @kernel
 def run(
-    c: None,
+    lag: float,
     state: State,
     imu: tuple[Times, Floats, Floats],
     mag: tuple[Times, Floats],
@@ -55,4 +60,4 @@ def run(
     output: Output,
     status: NDArray[np.uint32],
 ) -> Any:
-    return march(step, write, c, state, imu, mag, span, output, status)
+    return march(step, write, lag, state, imu, mag, span, output, status)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from ..geometry.jit import kernel, part
 from ..geometry.kernels import Matrix, Quaternion, Vector, matrix, turned_back
 from .ekf_kernel import Constants, Report, State, Symmetric, step
-from .loop import Floats, Span, Times, march
+from .loop_kernel import Floats, Span, Times, march
 
 Output: TypeAlias = tuple[
     Floats, Floats, Floats, Floats, Floats, Floats, Floats, Floats, Floats, Floats, Floats
@@ -48,7 +48,7 @@ def rpy_sigma(a: Symmetric, R: Matrix) -> tuple[float, float, float]:
 
 @part
 def write(output: Output, k: int, c: Constants, state: State, report: Report) -> None:
-    q, b, rate, P, _, _ = state
+    q, b, rate, P = state.q, state.b, state.rate, state.P
     orientation, angular_velocity, gyro_bias, covariance, angles, rates, biases, full, full_P, innovation, S = output
     R = matrix(q)
     a, _, v = P
