@@ -65,8 +65,15 @@ def orientation_from_rpy_ned(rpy: ArrayLike) -> Floats:
 
 
 def _zyx(rpy: Floats) -> Floats:
-    roll, pitch, yaw = (from_rotation_vector(rpy[..., i : i + 1] * np.eye(3)[i]) for i in range(3))
-    return multiply(multiply(yaw, pitch), roll)
+    """The product of yaw, pitch and roll, multiplied out."""
+    half = 0.5 * rpy
+    (cr, cp, cy), (sr, sp, sy) = np.moveaxis(np.cos(half), -1, 0), np.moveaxis(np.sin(half), -1, 0)
+    result = np.empty((*rpy.shape[:-1], 4))
+    result[..., 0] = sr * cp * cy - cr * sp * sy
+    result[..., 1] = cr * sp * cy + sr * cp * sy
+    result[..., 2] = cr * cp * sy - sr * sp * cy
+    result[..., 3] = cr * cp * cy + sr * sp * sy
+    return result
 
 
 def turn_heading(orientation: ArrayLike, angle_rad: ArrayLike) -> Floats:
