@@ -23,8 +23,7 @@ def recognizes(head: bytes) -> bool:
 
 
 def _is_text(head: bytes) -> bool:
-    at_line_start = head.startswith(_TEXT_FMT) or b"\n" + _TEXT_FMT in head
-    return at_line_start and b"\x00" not in head[:256]
+    return head.startswith(_TEXT_FMT) or (b"\n" + _TEXT_FMT in head and b"\x00" not in head[:256])
 
 
 def read(source: Source, options: IngestOptions | None = None) -> Ingested:

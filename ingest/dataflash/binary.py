@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ...schemas.columns import Table
 from . import units
 from .formats import FMT, HEADER_BYTES, STORED, Format, text
-from .kernels import BAD_FORMATS, FMT_LENGTH, RUNS, SKIPPED, TAIL, TORN_INSIDE, TORN_LAST, grouped, scan
+from .kernels import BAD_FORMATS, FMT_LENGTH, RUNS, SKIPPED, TAIL, TORN_INSIDE, TORN_LAST, Kinds, grouped, scan
 from .log import Log, Records
 
 Bytes = NDArray[np.uint8]
@@ -45,7 +45,7 @@ def read_only(data: Bytes) -> Bytes:
     return plain
 
 
-def _scanned(raw: Bytes) -> tuple[Ints, Ints, Ints, Ints]:
+def _scanned(raw: Bytes) -> tuple[Ints, Kinds, Ints, Ints]:
     nothing = np.full(256, -1, np.int64)
     places, kinds, definitions, counts, early = scan(raw, SIZES, nothing)
     first = nothing.copy()
@@ -84,10 +84,10 @@ def _split(raw: Bytes, places: Ints, form: Format, group: Ints) -> Iterator[Reco
         yield Records(form, _rows(raw, places[group], form), group)
         return
     dtype, offset = form.dtype.fields[form.instance][:2]  # type: ignore[index]
-    values = gathered(raw, places[group] + (HEADER_BYTES + offset), dtype.itemsize).view(dtype)
-    found, number = np.unique(values, return_inverse=True)
-    for i, value in enumerate(found.tolist()):
-        part = group if len(found) == 1 else group[number == i]
+    values = gathered(raw, places[group], dtype.itemsize, HEADER_BYTES + offset).view(dtype)
+    found = _distinct(values)
+    for value in found.tolist():
+        part = group if len(found) == 1 else group[values == value]
         yield Records(form, _rows(raw, places[part], form), part, text(value) if isinstance(value, bytes) else value)
 
 
@@ -109,13 +109,21 @@ def _joined(parts: list[Records]) -> Records:
 def _rows(raw: Bytes, places: Ints, form: Format) -> Table:
     if form.dtype.itemsize == 0:
         return np.zeros(len(places), form.dtype)
-    return gathered(raw, places + HEADER_BYTES, form.dtype.itemsize).view(form.dtype)
+    return gathered(raw, places, form.dtype.itemsize, HEADER_BYTES).view(form.dtype)
 
 
-def gathered(raw: Bytes, places: Ints, size: int) -> NDArray[np.void]:
-    """``size`` bytes from each of ``places`` (m,), as void rows (m,)."""
-    rows = np.ndarray((max(len(raw) - size + 1, 0),), np.dtype(f"V{size}"), buffer=raw.data, strides=(1,))
+def gathered(raw: Bytes, places: Ints, size: int, offset: int = 0) -> NDArray[np.void]:
+    """``size`` bytes from ``offset`` after each of ``places`` (m,), as void rows (m,)."""
+    count = max(len(raw) - offset - size + 1, 0)
+    rows = np.ndarray((count,), np.dtype(f"V{size}"), buffer=raw.data, offset=offset, strides=(1,))
     return rows[places]
+
+
+def _distinct(values: NDArray[np.generic]) -> NDArray[np.generic]:
+    """Sorted, as np.unique; most instances are one byte, which need only be counted."""
+    if values.dtype != np.uint8:
+        return np.unique(values)
+    return np.flatnonzero(np.bincount(values, minlength=1)).astype(np.uint8)
 
 
 def _completeness(raw: Bytes, counts: Ints) -> tuple[int, dict[str, int]]:

@@ -6,6 +6,7 @@ upper envelope of (GPS time - boot time). A segment ends where the boot clock st
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -24,8 +25,6 @@ SAME_CLOCK_NS: Final = SECOND_NS
 """Two stretches whose GPS offsets agree this well are on one clock."""
 WRAP_US: Final = 2**32 * 1000
 """A 32-bit count of milliseconds starts anew after 49.7 days."""
-LONGEST_US: Final = 2**52
-"""142 years: no count since boot is higher."""
 GPS_TYPES: Final = frozenset({"GPS", "GPS2", "GPSB"})
 WEEK_COLUMNS: Final = (("GWk", "GMS"), ("Week", "TimeMS"), ("Wk", "TWk"))
 REASONS: Final = {BACKWARD: "reboot", FORWARD: "clock step"}
@@ -41,7 +40,7 @@ class Clock:
     """
 
     boot_us: Ints
-    segment: Ints
+    segment: NDArray[np.int32]
     lines: tuple[Line, ...]
     segments: tuple[Segment, ...]
     known: tuple[bool, ...]
@@ -54,9 +53,13 @@ class Clock:
 
     def stamps(self, records: Records) -> Ints:
         """Time of each record (n,), ns."""
-        return self.at(self.boot_us[records.order], records.order)
+        return np.asarray(self._stamps[records.order])
 
-    def at(self, boot_us: Ints, order: Ints) -> Ints:
+    @cached_property
+    def _stamps(self) -> Ints:
+        return self.at(self.boot_us, slice(None))
+
+    def at(self, boot_us: Ints, order: Ints | slice) -> Ints:
         """Stamps of the times since boot ``boot_us`` (n,), in the segments of the records ``order`` (n,)."""
         if len(self.lines) == 1:
             return self.lines[0].at(boot_us * 1000)
@@ -68,8 +71,8 @@ class Clock:
         return result
 
 
-def time_us(records: Records) -> Ints | None:
-    """The records' own time since boot (n,), microseconds, or None where the type has none."""
+def time_column(records: Records) -> tuple[str, int] | None:
+    """The column with the records' own time since boot, and its unit in us; None where the type has none."""
     form = records.format
     first = form.columns[0] if form.columns else ""
     if form.name in GPS_TYPES and form.has("Week", "T"):
@@ -80,22 +83,18 @@ def time_us(records: Records) -> Ints | None:
         column, scale = first, 1
     else:
         return None
-    return _plausible(records.data[column]) * scale if records.data.dtype[column].kind in "iuf" else None
-
-
-def _plausible(values: NDArray[np.generic]) -> Ints:
-    """As int64, what no clock can show made negative."""
-    wide = values.astype(np.int64)
-    return np.where((wide < 0) | (wide > LONGEST_US), -1, wide)
+    return (column, scale) if records.data.dtype[column].kind in "iu" else None
 
 
 def read_clock(log: Log) -> Clock:
     """The log's clock: follow the times since boot, find the segments, and fit each to GPS time."""
     own = np.full(log.count, -1, np.int64)
     for records in log.records:
-        times = time_us(records)
-        if times is not None:
-            own[records.order] = times
+        column = time_column(records)
+        if column is not None:
+            name, scale = column
+            times = records.data[name]
+            own[records.order] = times if scale == 1 else times.astype(np.int64) * scale
     boot, piece, begins, why, absurd = pieces(own)
     wrapped = _unwrap(boot, begins, log)
     gps_order, gps_utc = gps_times(log)
@@ -144,9 +143,11 @@ def _unwrap(boot: Ints, begins: Ints, log: Log) -> set[int]:
     return wrapped
 
 
-def _segments(piece: Ints, why: Ints, wrapped: set[int], offsets: Sequence[Ints]) -> tuple[Ints, list[str]]:
+def _segments(
+    piece: NDArray[np.int32], why: Ints, wrapped: set[int], offsets: Sequence[Ints]
+) -> tuple[NDArray[np.int32], list[str]]:
     """Pieces to segments: a jump of the stamps is a gap, or records out of order, where GPS says the clock ran on."""
-    number = np.zeros(len(why), np.int64)
+    number = np.zeros(len(why), np.int32)
     reasons = ["start"]
     known = [median_offset(offsets[0])]
     for p in range(1, len(why)):

@@ -13,6 +13,9 @@ SLACK_US: Final = 1_000_000
 """Records are written by several threads: a stamp this far before or after its neighbours' means nothing."""
 MINUTE_US: Final = 60_000_000
 HOUR_US: Final = 3_600_000_000
+LONGEST_US: Final = 2**52
+"""142 years: no count since boot is higher."""
+NO_TIME: Final = -1
 LOOK: Final = 7
 """So many stamps decide whether a jump is the clock's or one record's."""
 NEITHER, BACKWARD, FORWARD = range(3)
@@ -24,7 +27,7 @@ def _agreeing(time_us: Ints, start: int, low: int, high: int) -> tuple[int, int]
     seen = 0
     inside = 0
     for i in range(start, time_us.size):
-        if time_us[i] >= 0:
+        if 0 <= time_us[i] <= LONGEST_US:
             seen += 1
             if low <= time_us[i] <= high:
                 inside += 1
@@ -49,21 +52,22 @@ def _absurd(time_us: Ints, i: int, latest: int) -> bool:
 
 
 @kernel
-def pieces(time_us: Ints) -> tuple[Ints, Ints, Ints, Ints, int]:
-    """Follow the clock through all records, in the log's order; ``time_us`` is -1 where a record has none.
+def pieces(time_us: Ints) -> tuple[Ints, NDArray[np.int32], Ints, Ints, int]:
+    """Follow the clock through all records, in the log's order; ``time_us`` is NO_TIME where one has none.
 
     Returns the time of every record (its neighbour's where it has none or an absurd one), the number of the piece it
     is in, where each piece begins, why (BACKWARD, FORWARD), and how many stamps were absurd.
     """
     filled = np.empty(time_us.size, np.int64)
-    piece = np.zeros(time_us.size, np.int64)
+    piece = np.zeros(time_us.size, np.int32)
     begins = [0]
     reasons = [NEITHER]
     absurd = 0
     latest = -1
     last = -1
     for i in range(time_us.size):
-        t = int(time_us[i])
+        t = int(time_us[i]) if time_us[i] <= LONGEST_US else -1
+        absurd += t < 0 and time_us[i] != NO_TIME
         if t >= 0 and (latest < 0 or abs(t - latest) > SLACK_US):
             if _absurd(time_us, i, latest):
                 absurd += 1

@@ -1,6 +1,6 @@
 """The walk over a binary log, record by record: each one's length says where the next begins."""
 
-from typing import Final
+from typing import Final, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,7 +9,9 @@ from ...geometry.jit import inline_kernel, kernel
 
 Bytes = NDArray[np.uint8]
 Ints = NDArray[np.int64]
+Kinds = NDArray[np.int32]
 Flags = NDArray[np.bool_]
+Places = TypeVar("Places", Ints, Kinds)
 
 HEAD_1: Final = 0xA3
 HEAD_2: Final = 0x95
@@ -113,12 +115,12 @@ def _define(
 
 @kernel
 def _doubtful(
-    data: Bytes, at: int, size: int, sizes: Ints, length: Ints, timed: Flags, lost: bool, now: int
+    data: Bytes, at: int, size: int, sizes: Ints, length: Ints, timed: Flags, lost: bool, last_timed: int
 ) -> tuple[int, int]:
     """A record of ``size`` bytes that no other follows: its size, 0 if it is none; and how many bytes to skip then.
 
     It has lost bytes if a record that is followed begins within it. Behind damage it is believed only if its time is
-    near ``now`` (NONE: not known), or if it is a sound definition.
+    near that of the record at ``last_timed`` (or NONE), or if it is a sound definition.
     """
     within = _chained_within(data, at + 1, at + size, length)
     if within >= 0:
@@ -126,7 +128,7 @@ def _doubtful(
     kind = data[at + 2]
     if not lost or (kind == FMT_TYPE and _defined_length(data, at, sizes) > 0):
         return size, 1
-    near = timed[kind] and now >= 0 and abs(_time_us(data, at) - now) < NEAR_US
+    near = timed[kind] and last_timed >= 0 and abs(_time_us(data, at) - _time_us(data, last_timed)) < NEAR_US
     return (size if near else 0), 1
 
 
@@ -139,21 +141,21 @@ def _is_torn_last(data: Bytes, at: int, length: Ints) -> bool:
 
 
 @kernel
-def _grown(values: Ints) -> Ints:
-    result = np.empty(2 * values.size, np.int64)
+def _grown(values: Places) -> Places:
+    result = np.empty(2 * values.size, values.dtype)
     result[: values.size] = values
     return result
 
 
 @kernel
-def scan(data: Bytes, sizes: Ints, first: Ints) -> tuple[Ints, Ints, Ints, Ints, Flags]:
+def scan(data: Bytes, sizes: Ints, first: Ints) -> tuple[Ints, Kinds, Ints, Ints, Flags]:
     """Walk a binary log.
 
     ``sizes`` (256,) is the size of each format character, ``first`` (256,) where a definition stands that holds from
     the start on, or NONE. Returns the place of every record, the number of its definition, the place of every
     definition (number 0 is FMT's own, at NONE), the counts named above, and the types met before their definition.
     """
-    places, kinds = np.empty(data.size // 32 + 1024, np.int64), np.empty(data.size // 32 + 1024, np.int64)
+    places, kinds = np.empty(data.size // 32 + 1024, np.int64), np.empty(data.size // 32 + 1024, np.int32)
     definitions = np.empty(data.size // FMT_LENGTH + 258, np.int64)
     length, current = np.zeros(256, np.int64), np.zeros(256, np.int64)
     timed, early = np.zeros(256, np.bool_), np.zeros(256, np.bool_)
@@ -166,13 +168,14 @@ def scan(data: Bytes, sizes: Ints, first: Ints) -> tuple[Ints, Ints, Ints, Ints,
         if first[kind] >= 0:
             defined = _define(data, first[kind], sizes, definitions, defined, length, current, timed)
     found = 0
-    now = NONE
+    last_timed = NONE
     at = 0
+    size = _known(data, at, length)
     while at < data.size:
-        lost = counts[TAIL] >= 0
-        size, skip = _known(data, at, length), 1
-        if size > 0 and not _chained(data, at + size, length):
-            size, skip = _doubtful(data, at, size, sizes, length, timed, lost, now)
+        skip = 1
+        following = _known(data, at + size, length) if size > 0 else 0
+        if size > 0 and following == 0 and not _chained(data, at + size, length):
+            size, skip = _doubtful(data, at, size, sizes, length, timed, counts[TAIL] >= 0, last_timed)
         if size == 0:
             if _is_torn_last(data, at, length):
                 counts[TORN_LAST] += 1
@@ -182,11 +185,12 @@ def scan(data: Bytes, sizes: Ints, first: Ints) -> tuple[Ints, Ints, Ints, Ints,
             if _is_header(data, at):
                 early[data[at + 2]] |= length[data[at + 2]] == 0
             counts[TORN_INSIDE] += skip > 1
-            if not lost:
+            if counts[TAIL] < 0:
                 counts[RUNS] += skip == 1
                 counts[TAIL] = at
             counts[SKIPPED] += skip
             at += skip
+            size = _known(data, at, length)
             continue
         counts[TAIL] = NONE
         if found == places.size:
@@ -194,17 +198,19 @@ def scan(data: Bytes, sizes: Ints, first: Ints) -> tuple[Ints, Ints, Ints, Ints,
         kind = data[at + 2]
         places[found], kinds[found] = at, current[kind]
         found += 1
-        if timed[kind]:
-            now = _time_us(data, at)
-        elif kind == FMT_TYPE:
-            counts[BAD_FORMATS] += _defined_length(data, at, sizes) == 0
-            defined = _define(data, at, sizes, definitions, defined, length, current, timed)
         at += size
-    return places[:found].copy(), kinds[:found].copy(), definitions[:defined].copy(), counts, early
+        size = following
+        if timed[kind]:
+            last_timed = places[found - 1]
+        elif kind == FMT_TYPE:
+            counts[BAD_FORMATS] += _defined_length(data, places[found - 1], sizes) == 0
+            defined = _define(data, places[found - 1], sizes, definitions, defined, length, current, timed)
+            size = _known(data, at, length)
+    return places[:found], kinds[:found], definitions[:defined].copy(), counts, early
 
 
 @kernel
-def grouped(kinds: Ints, count: int) -> tuple[Ints, Ints]:
+def grouped(kinds: Kinds, count: int) -> tuple[Ints, Ints]:
     """Stable counting sort: the record numbers by kind, and where each of ``count`` kinds begins (count + 1,)."""
     starts = np.zeros(count + 1, np.int64)
     for i in range(kinds.size):

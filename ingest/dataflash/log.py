@@ -39,8 +39,10 @@ class Records:
 
     def by_column(self, column: str) -> "Iterator[Records]":
         """The records apart by the value of ``column``, which becomes their instance."""
-        for value in np.unique(self.data[column]).tolist():
-            yield self.select(self.data[column] == value, value)
+        values = np.ascontiguousarray(self.data[column])
+        found = np.unique(values).tolist()
+        for value in found:
+            yield self.select(slice(None) if len(found) == 1 else values == value, value)
 
 
 @dataclass(frozen=True, eq=False)

@@ -89,7 +89,7 @@ FIRMWARE_OF_BUILD: Final = _numbered(
 
 def mode(firmware: str, number: int) -> str:
     """A flight mode's name; its number where the firmware or the mode is unknown."""
-    return MODES.get(firmware, {}).get(number, f"mode {number}")
+    return MODES.get(firmware, {}).get(number, str(number))
 
 
 def event(number: int) -> str:

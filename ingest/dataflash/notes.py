@@ -96,9 +96,10 @@ def _mode(row: Mapping[str, Any], firmware: str) -> tuple[Severity, str] | None:
     mode = row.get("Mode", row.get("ModeNum"))
     if mode is None:
         return None
-    named = text(mode) if isinstance(mode, bytes) else names.mode(firmware, int(row.get("ModeNum", mode)))
+    written = text(mode) if isinstance(mode, bytes) else str(row.get("ModeNum", mode))
+    named = names.mode(firmware, int(written)) if written.isdecimal() else written
     reason = f" (reason {row['Rsn']})" if "Rsn" in row else ""
-    return Severity.INFO, f"mode {named}{reason}".replace("mode mode", "mode")
+    return Severity.INFO, f"mode {named}{reason}"
 
 
 def _arming(row: Mapping[str, Any]) -> tuple[Severity, str] | None:

@@ -109,7 +109,7 @@ def mag(log: Log, clock: Clock) -> Iterator[Columns]:
 
 
 def gnss(log: Log, clock: Clock) -> Iterator[Columns]:
-    """``/gnss{n}/fix``: degrees and metres, where there was a fix; altitude above mean sea level, as ArduPilot logs it."""
+    """``/gnss{n}/fix``, where there was a fix: degrees, and metres above mean sea level, as ArduPilot logs them."""
     for n, found in numbered(log, "GPS").items():
         records = found
         longitude = next((name for name in ("Lng", "Lon") if records.format.has(name)), None)

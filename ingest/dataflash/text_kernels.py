@@ -11,7 +11,7 @@ Bytes = NDArray[np.uint8]
 Ints = NDArray[np.int64]
 Floats = NDArray[np.float64]
 
-NEWLINE, RETURN, SPACE, COMMA, POINT, MINUS, PLUS, ZERO, NINE = 10, 13, 32, 44, 46, 45, 43, 48, 57
+TAB, NEWLINE, RETURN, SPACE, COMMA, POINT, MINUS, PLUS, ZERO, NINE = 9, 10, 13, 32, 44, 46, 45, 43, 48, 57
 LONGEST_NAME: Final = 7
 """Names are packed into an integer; DataFlash's have four characters at most."""
 
@@ -24,6 +24,11 @@ POWERS: Final[Floats] = np.array([float(f"1e{power}") for power in range(23)])
 """Powers of ten that a double holds exactly."""
 EXACT: Final = 2**53
 WIDEST: Final = 10**17
+
+
+@inline_kernel
+def _blank(character: np.uint8) -> bool:
+    return character in (SPACE, RETURN, TAB)
 
 
 @kernel
@@ -41,7 +46,7 @@ def lines(data: Bytes) -> tuple[Ints, Ints, Ints]:
         while stop < data.size and data[stop] != NEWLINE:
             stop += 1
         end = stop
-        while end > at and data[end - 1] <= SPACE:
+        while end > at and _blank(data[end - 1]):
             end -= 1
         if end > at:
             if count == capacity:
@@ -157,9 +162,9 @@ def values(data: Bytes, begins: Ints, ends: Ints, kinds: Ints) -> tuple[Ints, In
                 at = stop
                 continue
             first, last = at, stop
-            while first < last and data[first] <= SPACE:
+            while first < last and _blank(data[first]):
                 first += 1
-            while last > first and data[last - 1] <= SPACE:
+            while last > first and _blank(data[last - 1]):
                 last -= 1
             starts[row, column], stops[row, column], state[row, column] = first, last, UNUSUAL
             at = stop
