@@ -7,6 +7,7 @@ one set of string and sequence lengths; messages that share those lengths share 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -165,7 +166,7 @@ def _spaced(dtype: "np.dtype[np.generic]", stride: int) -> "np.dtype[np.generic]
         return dtype
     if dtype.names is None or stride < dtype.itemsize:
         return None
-    fields = dtype.fields or {}
+    fields: Mapping[str, Any] = dtype.fields or {}
     return np.dtype(
         {
             "names": list(dtype.names),

@@ -1,6 +1,7 @@
 """Columns to MCAP bytes and back."""
 
-from .logfile import ChannelInfo, LogFile
+from .channels import ChannelInfo
+from .logfile import LogFile
 from .logfile import open_log as open
 from .records import Attachment, Statistics
 from .writer import write

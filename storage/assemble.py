@@ -77,12 +77,10 @@ def _padded(node: Texts, width: int) -> NDArray[np.generic]:
 def _sequences(node: Numbers) -> NDArray[np.generic]:
     native = node.dtype.newbyteorder("=")
     if _all_equal(node.count):
-        count = int(node.count[0]) if len(node.count) else 0
-        size = node.count * node.dtype.itemsize
-        values = joined(node.pool, node.start, size).view(node.dtype).reshape(len(size), count)
+        shape = (len(node.count), int(node.count[0]) if len(node.count) else 0)
+        values = joined(node.pool, node.start, node.count * node.dtype.itemsize).view(node.dtype).reshape(shape)
         return values.astype(native, copy=False)
-    size = node.dtype.itemsize
-    ends = node.start + node.count * size
+    ends = node.start + node.count * node.dtype.itemsize
     rows = (
         np.frombuffer(node.pool[a:b].tobytes(), node.dtype).astype(native, copy=False)
         for a, b in zip(node.start.tolist(), ends.tolist(), strict=True)

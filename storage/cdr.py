@@ -7,7 +7,7 @@ import numpy as np
 from ..schemas.columns import Channel, Columns, Table
 from ..schemas.definition import MessageType
 from ..schemas.layout import CDR2_BE, CDR2_LE, CDR_BE, CDR_LE, ROS1, Layout, Wire, layout
-from .collect import Payloads
+from .collect import Payloads, Word
 from .decode import OverrunError, decode
 from .disassemble import disassemble
 from .encode import encode, sizes
@@ -44,8 +44,12 @@ def read_cdr(message: MessageType, payloads: Payloads) -> Table:
     """The messages as columns; PayloadError for what is no CDR of this type."""
     if len(payloads) == 0:
         return np.zeros(0, message.dtype())
-    if int(payloads.size.min()) < HEADER:
+    least = payloads.rows.size if payloads.rows else int(payloads.size.min())
+    if least < HEADER:
         raise PayloadError(int(np.argmin(payloads.size)), "the payload is shorter than CDR's header of 4 bytes")
+    if payloads.rows is not None and payloads.rows.alike:
+        kind = int(payloads.column(0, np.dtype(">u2"))[0])
+        return _read(message, _wire(kind, 0), payloads)
     kinds = window(payloads.data, np.dtype(">u2"))[payloads.start].astype(np.int64)
     if (kinds == kinds[0]).all():
         return _read(message, _wire(int(kinds[0]), 0), payloads)
@@ -66,32 +70,29 @@ def _wire(kind: int, row: int) -> Wire:
 
 
 def _read(message: MessageType, wire: Wire, payloads: Payloads) -> Table:
-    if payloads.stride is not None:
-        shared = _shared_layout(message, wire, payloads)
-        if shared is not None and shared.dtype is not None and shared.dtype.itemsize <= payloads.stride - HEADER:
-            origin = int(payloads.start[0]) + HEADER
-            return np.ndarray((len(payloads),), shared.dtype, payloads.data, origin, (payloads.stride,))
+    rows = payloads.rows
+    if rows is not None and rows.alike:
+        shared = _layout_of(message, wire, payloads.data[rows.offset + HEADER : rows.offset + rows.size].tobytes())
+        if shared is not None and shared.dtype is not None and shared.dtype.itemsize <= rows.stride - HEADER:
+            return payloads.column(HEADER, shared.dtype)
     return _general(message, wire, payloads, HEADER)
 
 
-def _shared_layout(message: MessageType, wire: Wire, payloads: Payloads) -> Layout | None:
-    """The layout of the first message, if all others have its lengths too."""
-    start, size = int(payloads.start[0]) + HEADER, int(payloads.size[0]) - HEADER
+def watched(message: MessageType, payload: bytes) -> list[Word]:
+    """The words that a payload's layout rests on: byte order and lengths, as `Collector` takes them."""
+    if len(payload) < HEADER or payload[0] or payload[1] not in WIRES:
+        return []
+    laid = _layout_of(message, WIRES[payload[1]], payload[HEADER:])
+    lengths = [] if laid is None else [slot for slot in laid.slots if slot.count is not None]
+    return [(0, np.dtype("<u2")), *[(HEADER + slot.offset, slot.dtype) for slot in lengths]]
+
+
+def _layout_of(message: MessageType, wire: Wire, payload: bytes) -> Layout | None:
     try:
-        lengths = lengths_of(message, wire, payloads.data[start : start + size].tobytes())
+        laid = layout(message, wire, lengths_of(message, wire, payload))
     except ProbeError:
         return None
-    laid = layout(message, wire, lengths)
-    if laid.size > size:
-        return None
-    for slot in laid.slots:
-        if slot.count is not None:
-            words = np.ndarray(
-                (len(payloads),), slot.dtype, payloads.data, start + slot.offset, (payloads.stride or 0,)
-            )
-            if (words != slot.count).any():
-                return None
-    return laid
+    return laid if laid.size <= len(payload) else None
 
 
 def _general(message: MessageType, wire: Wire, payloads: Payloads, header: int) -> Table:
@@ -109,7 +110,7 @@ def _read_mixed(message: MessageType, payloads: Payloads, kinds: Places) -> Tabl
         wire = _wire(kind, int(which[0]))
         if wire == CDR_LE:
             continue
-        part = Payloads(payloads.data, payloads.start[which], payloads.size[which], payloads.time_ns[which], None)
+        part = Payloads(payloads.data, payloads.time_ns[which], (payloads.start[which], payloads.size[which]))
         try:
             table = _general(message, wire, part, HEADER)
         except PayloadError as error:
@@ -120,4 +121,4 @@ def _read_mixed(message: MessageType, payloads: Payloads, kinds: Places) -> Tabl
         encode(steps_of(message), CDR_LE, tree, again, starts(length))
         start[which], size[which] = len(data) + starts(length) - HEADER, length + HEADER
         data = np.concatenate([data, again])
-    return _general(message, CDR_LE, Payloads(data, start, size, payloads.time_ns, None), HEADER)
+    return _general(message, CDR_LE, Payloads(data, payloads.time_ns, (start, size)), HEADER)

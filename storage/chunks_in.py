@@ -1,5 +1,6 @@
 """Chunks back to bytes, and where in them each channel's messages are."""
 
+import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -11,7 +12,6 @@ from .crc import crc32
 from .input_file import InputFile
 from .ragged import Bytes, Places, window
 from .records import (
-    INDEX_ENTRY,
     MESSAGE_HEAD,
     RECORD_HEAD,
     ChunkIndex,
@@ -22,13 +22,14 @@ from .records import (
     read_schema,
 )
 
-U8 = np.dtype("<u8")
+I8 = np.dtype("<i8")
+_INDEX_HEAD = struct.Struct("<BQHI")
 U2 = np.dtype("<u2")
 
 
 @dataclass(frozen=True, eq=False)
 class Records:
-    """Uncompressed records, which came from byte ``offset`` of the file."""
+    """Uncompressed records, which came from byte ``offset`` of the file; valid until the next chunk is loaded."""
 
     data: Bytes
     offset: int
@@ -64,7 +65,7 @@ class ChunkReader:
     def load(self, chunk: ChunkIndex, indexed: bool = True) -> tuple[Records, memoryview]:
         """The chunk's records, and the bytes of the message indexes behind it (none unless ``indexed``)."""
         length = chunk.length + (chunk.message_index_length if indexed else 0)
-        raw = memoryview(self.file.read(chunk.offset, length))
+        raw = self.file.view(chunk.offset, length)
         cursor = Cursor(raw[: chunk.length], self.file.path, chunk.offset)
         op, content = cursor.head()
         if op != Op.CHUNK or content != chunk.length - RECORD_HEAD:
@@ -100,19 +101,17 @@ class ChunkReader:
         """Channel id -> messages, from the message indexes behind the chunk; InputError where they contradict it."""
         origin = chunk.offset + chunk.length
         found: dict[int, Messages] = {}
-        for op, content in Cursor(indexes, self.file.path, origin).records():
-            if op != Op.MESSAGE_INDEX:
-                continue
-            (channel,) = content.numbers("H")
-            block = content.block()
-            if len(block) % INDEX_ENTRY.itemsize:
-                raise damaged(self.file.path, content.origin, f"a message index of {len(block)} bytes")
-            entries = np.frombuffer(block, U8).astype(np.int64).reshape(-1, 2)
-            if channel in found:
-                raise damaged(self.file.path, content.origin, f"a second index of channel {channel} in one chunk")
-            found[channel] = Messages(entries[:, 1], entries[:, 0])
-        if missing := set(chunk.message_indexes) - set(found):
-            raise damaged(self.file.path, origin, f"no message index of channel {min(missing)} behind its chunk")
+        at, end = 0, len(indexes)
+        while at < end:
+            op, length, channel, size = _INDEX_HEAD.unpack_from(indexes, at) if end - at >= 15 else (0, 0, 0, 0)
+            if op != Op.MESSAGE_INDEX or size != length - 6 or size % 16 or size > end - at - 15 or channel in found:
+                raise damaged(self.file.path, origin + at, "no sound message index where one is said to be")
+            entries = np.frombuffer(indexes, I8, size // 8, at + 15).reshape(-1, 2).T.copy()
+            found[channel] = Messages(entries[1], entries[0])
+            at += 15 + size
+        if not found.keys() >= chunk.message_indexes.keys():
+            missing = min(chunk.message_indexes.keys() - found.keys())
+            raise damaged(self.file.path, origin, f"no message index of channel {missing} behind its chunk")
         return found
 
     def scanned(self, records: Records) -> dict[int, Messages]:
@@ -125,13 +124,13 @@ class ChunkReader:
                 self.file.path, records.offset, f"the last message, at {int(at[-1])} in its chunk, is too short"
             )
         channels = window(records.data, U2)[at + RECORD_HEAD]
-        times = window(records.data, U8)[at + 15].astype(np.int64)
+        times = window(records.data, I8)[at + 15]
         return {int(c): Messages(at[channels == c], times[channels == c]) for c in np.unique(channels)}
 
 
 def walk(file: InputFile, records: Records) -> Iterator[tuple[int, int, int]]:
     """Opcode, place and length of each record (its nine leading bytes included)."""
-    data = memoryview(records.data)
+    data = records.data.data
     at, end = 0, len(data)
     while at < end:
         op = data[at]
@@ -147,7 +146,7 @@ def definitions(file: InputFile, records: Records) -> Iterator[object]:
     """The schemas and channels among the records."""
     for op, at, length in walk(file, records):
         if op in (Op.SCHEMA, Op.CHANNEL):
-            content = memoryview(records.data)[at + RECORD_HEAD : at + length]
+            content = records.data.data[at + RECORD_HEAD : at + length]
             cursor = Cursor(content, file.path, records.offset)
             yield read_schema(cursor) if op == Op.SCHEMA else read_channel(cursor)
 

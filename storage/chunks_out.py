@@ -1,5 +1,6 @@
 """Channels to chunks with their message indexes: slabs of several chunks are filled, then cut and compressed."""
 
+import itertools
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -88,7 +89,7 @@ class ChunkWriter:
             index["time"] = outlet.rows.time_ns[low:high]
             index["offset"] = at - np.repeat(begins[:-1], per_chunk)
             _note(index, inside.tolist(), outlet.channel.id, packed, spans)
-        whole = memoryview(slab)
+        whole = slab.data
         for number in range(last - first):
             begin, end = int(begins[number]), int(begins[number + 1])
             intro = intros.get(first + number, b"")
@@ -127,7 +128,7 @@ def _note(
     spans: list[list[int]],
 ) -> None:
     times = index["time"]
-    for number, (low, high) in enumerate(zip(cuts, cuts[1:], strict=False)):
+    for number, (low, high) in enumerate(itertools.pairwise(cuts)):
         if low < high:
             packed[number].append((channel, index[low:high].tobytes()))
             span = spans[number]

@@ -124,7 +124,8 @@ def _data_end(file: InputFile, limit: int) -> int:
 def _walk(file: InputFile, index: Index) -> None:
     """Go over the data section, past the records that the summary places, and note all others."""
     known = {chunk.offset: chunk.length + chunk.message_index_length for chunk in index.chunks}
-    known |= {item.offset: item.length for item in [*index.attachments, *index.metadata]}
+    known |= {item.offset: item.length for item in index.attachments}
+    known |= {item.offset: item.length for item in index.metadata}
     _check_places(file, index, known)
     at = len(MAGIC)
     walker = _Walker(file, index)
@@ -158,7 +159,7 @@ class _Walker:
     def record(self, at: int) -> int:
         """Note the record at ``at``; where the next begins."""
         op, length = struct.unpack("<BQ", self.file.peek(at, RECORD_HEAD))
-        end = at + RECORD_HEAD + length
+        end: int = at + RECORD_HEAD + length
         if end > self.index.data_end:
             what = f"a record (opcode {op}) of {length} bytes, which goes beyond the end of the data section"
             raise damaged(self.file.path, at, what)

@@ -21,23 +21,39 @@ class InputFile:
             raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
         self.size = os.fstat(self._file.fileno()).st_size
         self._window = (0, b"")
+        self._buffer = memoryview(bytearray())
 
     def read(self, offset: int, length: int) -> bytes:
         """``length`` bytes from ``offset``; InputError where the file has not so many."""
+        self._check(offset, length)
+        target = bytearray(length)
+        self._fill(offset, memoryview(target))
+        return bytes(target)
+
+    def view(self, offset: int, length: int) -> memoryview:
+        """As `read`, in a buffer that the next call overwrites (fresh memory for each chunk costs more than that)."""
+        self._check(offset, length)
+        if len(self._buffer) < length:
+            self._buffer = memoryview(bytearray(length))
+        target = self._buffer[:length]
+        self._fill(offset, target)
+        return target
+
+    def _check(self, offset: int, length: int) -> None:
         if offset < 0 or length < 0 or offset + length > self.size:
             raise damaged(self.path, offset, f"{length} bytes are said to lie here, in a file of {self.size}")
-        parts = []
+
+    def _fill(self, offset: int, target: memoryview) -> None:
+        done = 0
         try:
             self._file.seek(offset)
-            while length:
-                part = self._file.read(length)
-                if not part:
+            while done < len(target):
+                count = self._file.readinto(target[done:])
+                if not count:
                     raise damaged(self.path, offset, "the file became shorter while it was read")
-                parts.append(part)
-                length -= len(part)
+                done += count
         except OSError as error:
             raise InputError(f"{self.path}: byte {offset}: cannot be read: {error.strerror or error}") from error
-        return parts[0] if len(parts) == 1 else b"".join(parts)
 
     def peek(self, offset: int, length: int) -> bytes:
         """As `read`, by way of a window that moves along."""

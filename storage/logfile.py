@@ -1,26 +1,24 @@
 """`open`: an MCAP file's channels as columns."""
 
 import os
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from types import TracebackType
 
 import numpy as np
 
-from ..schemas.columns import Channel, Columns, Table
-from ..schemas.definition import Field, MessageType
+from ..schemas.columns import Channel, Columns
 from ..schemas.errors import InputError, UsageError
-from ..schemas.passthrough import source_names
-from .cdr import PayloadError, read_cdr, read_ros1, supported
+from .cdr import PayloadError, watched
+from .channels import ChannelInfo, decoded, type_of
 from .chunks_in import ChunkReader, Messages, Records, definitions, times
 from .collect import Collector, Payloads
 from .crc import crc32
 from .index import read_index
 from .input_file import InputFile
-from .json_columns import read_json
 from .records import (
+    MESSAGE_HEAD,
     RECORD_HEAD,
     Attachment,
     ChannelRecord,
@@ -30,30 +28,7 @@ from .records import (
     Statistics,
     damaged,
 )
-from .ros1 import parse_ros1
 from .writer import QOS, QOS_KEY
-
-RAW = MessageType("attlog_msgs/msg/Raw", (Field("data", "uint8", 0, "the message as it is in the file"),))
-"""The type of channels whose encoding is not known: one field, the bytes."""
-
-
-@dataclass(frozen=True)
-class ChannelInfo:
-    """A channel of a file: ``encoding`` is its messages' (cdr, json, …), ``raw`` says why it stays undecoded."""
-
-    channel: Channel
-    count: int
-    encoding: str
-    schema_name: str
-    schema_encoding: str
-    id: int
-    metadata: Mapping[str, str] = field(default_factory=dict)
-    raw: str = ""
-
-    @property
-    def source_names(self) -> Mapping[str, str]:
-        """The source's own field name -> the ROS name."""
-        return source_names(self.channel.type)
 
 
 class LogFile:
@@ -157,7 +132,7 @@ class LogFile:
                 raise UsageError(f"{self.path}: no topic {topic}; it has {', '.join(sorted(self.topics)) or 'none'}")
         infos = {topic: self.topics[topic] for topic in wanted}
         with self._guard(0):
-            collectors = self._collect({info.id: info.count for info in infos.values()}, start_ns, end_ns, crc)
+            collectors = self._collect(list(infos.values()), start_ns, end_ns, crc)
         return {topic: self._columns(info, collectors[info.id].payloads()) for topic, info in infos.items()}
 
     def parts(
@@ -171,19 +146,19 @@ class LogFile:
             records, indexes = reader.load(chunk)
             found = reader.indexed(chunk, indexes) if chunk.message_indexes else reader.scanned(records)
             yield records, _wanted(found, wanted)
-        for offset, length in self.index.spans:
-            records = Records(np.frombuffer(self.file.read(offset, length), np.uint8), offset)
+        for records in self._loose():
             yield records, _wanted(reader.scanned(records), wanted)
 
     def _collect(
-        self, expected: Mapping[int, int], start_ns: int | None, end_ns: int | None, crc: bool
+        self, infos: Sequence[ChannelInfo], start_ns: int | None, end_ns: int | None, crc: bool
     ) -> dict[int, Collector]:
         whole = start_ns is None and end_ns is None
         possible = sum(chunk.size for chunk in self.index.chunks) + self.file.size
-        collectors = {
-            number: Collector(self.file, number, min(count, possible // 31) if whole else 0)
-            for number, count in expected.items()
-        }
+        collectors = {}
+        for info in infos:
+            expected = min(info.count, possible // MESSAGE_HEAD) if whole else 0
+            watch = {"watch": partial(watched, info.channel.type)} if info.encoding == "cdr" and not info.raw else {}
+            collectors[info.id] = Collector(self.file, info.id, expected, **watch)
         for records, found in self.parts(set(collectors), start_ns, end_ns, crc):
             with self._guard(records.offset):
                 for number, messages in found.items():
@@ -191,23 +166,14 @@ class LogFile:
         return collectors
 
     def _columns(self, info: ChannelInfo, payloads: Payloads) -> Columns:
-        channel = info.channel
         try:
             with self._guard(0):
-                data: Table
-                if info.raw:
-                    data = _raw(payloads)
-                elif info.encoding == "json":
-                    message, data = read_json(info.schema_name or channel.topic, payloads)
-                    channel = Channel(channel.topic, message, channel.metadata)
-                else:
-                    data = (read_ros1 if info.encoding == "ros1" else read_cdr)(channel.type, payloads)
+                return decoded(info, payloads)
         except PayloadError as error:
             raise InputError(
-                f"{self.path}: {channel.topic}, message {error.row} (log time {int(payloads.time_ns[error.row])} ns): "
-                f"{error}; the file is damaged, or the channel's schema {info.schema_name!r} is not that of its messages"
+                f"{self.path}: {info.channel.topic}, message {error.row} (log time {payloads.time_ns[error.row]} ns): "
+                f"{error}; the file is damaged, or {info.schema_name!r} is not the type of the channel's messages"
             ) from error
-        return Columns(channel, payloads.time_ns, data)
 
     def _info(self, record: ChannelRecord, topic: str) -> ChannelInfo:
         schema = self.index.schemas.get(record.schema_id)
@@ -215,12 +181,45 @@ class LogFile:
             raise damaged(
                 self.path, self.index.data_end, f"{record.topic} has the schema {record.schema_id}, which is missing"
             )
-        message, why = _type(record, schema)
+        message, why = type_of(record, schema)
         metadata = {key: value for key, value in record.metadata.items() if (key, value) != (QOS_KEY, QOS)}
         name, encoding = (schema.name, schema.encoding) if schema else ("", "")
         count = self.statistics.counts.get(record.id, 0)
         channel = Channel(topic, message, metadata)
-        return ChannelInfo(channel, count, record.encoding, name, encoding, record.id, record.metadata, why)
+        span = partial(self._span, record.id)
+        return ChannelInfo(channel, count, record.encoding, name, encoding, record.id, record.metadata, why, span)
+
+    def _span(self, number: int) -> tuple[int, int]:
+        return self._spans.get(number, (0, 0))
+
+    @cached_property
+    def _spans(self) -> dict[int, tuple[int, int]]:
+        """Channel id -> first and last log time."""
+        found: dict[int, tuple[int, int]] = {}
+        with self._guard(0):
+            for number, messages in self._positions():
+                if len(messages.at):
+                    first, last = int(messages.time_ns.min()), int(messages.time_ns.max())
+                    earlier = found.get(number, (first, last))
+                    found[number] = min(first, earlier[0]), max(last, earlier[1])
+        return found
+
+    def _positions(self) -> Iterator[tuple[int, Messages]]:
+        """Every channel's messages in every chunk; chunks with message indexes are not unpacked."""
+        reader = ChunkReader(self.file, crc=True)
+        for chunk in self.index.chunks:
+            if chunk.message_indexes:
+                indexes = self.file.view(chunk.offset + chunk.length, chunk.message_index_length)
+                yield from reader.indexed(chunk, indexes).items()
+            else:
+                yield from reader.scanned(reader.load(chunk)[0]).items()
+        for records in self._loose():
+            yield from reader.scanned(records).items()
+
+    def _loose(self) -> Iterator[Records]:
+        """The messages outside chunks."""
+        for offset, length in self.index.spans:
+            yield Records(np.frombuffer(self.file.view(offset, length), np.uint8), offset)
 
     def _complete(self) -> None:
         """Find the channels that only the chunks name."""
@@ -242,22 +241,20 @@ class LogFile:
 
     def _counted(self) -> Statistics:
         counts: dict[int, int] = {}
-        first, last = [], []
-        for _, found in self.parts(None):
-            for number, messages in found.items():
-                if len(messages.at):
-                    counts[number] = counts.get(number, 0) + len(messages.at)
-                    first.append(int(messages.time_ns.min()))
-                    last.append(int(messages.time_ns.max()))
-        index = self.index
-        sizes = (
+        for number, messages in self._positions():
+            counts[number] = counts.get(number, 0) + len(messages.at)
+        index, spans = self.index, self._spans.values()
+        return Statistics(
+            sum(counts.values()),
             len(index.schemas),
             len(index.channels),
             len(index.attachments),
             len(index.metadata),
             len(index.chunks),
+            min((start for start, _ in spans), default=0),
+            max((end for _, end in spans), default=0),
+            counts,
         )
-        return Statistics(sum(counts.values()), *sizes, min(first, default=0), max(last, default=0), counts)
 
     def _attachment(self, offset: int, length: int) -> Attachment:
         content = Cursor(self.file.read(offset, length), self.path, offset)
@@ -288,29 +285,6 @@ def _holds(chunk: ChunkIndex, wanted: set[int] | None) -> bool:
 
 def _wanted(found: dict[int, Messages], wanted: set[int] | None) -> dict[int, Messages]:
     return found if wanted is None else {number: messages for number, messages in found.items() if number in wanted}
-
-
-def _type(record: ChannelRecord, schema: SchemaRecord | None) -> tuple[MessageType, str]:
-    """The channel's type, or RAW and the reason."""
-    encoding = (record.encoding, schema.encoding if schema else "")
-    if record.encoding == "json":
-        return RAW, ""
-    parsers = {("cdr", "ros2msg"): MessageType.parse, ("ros1", "ros1msg"): parse_ros1}
-    if schema is None or encoding not in parsers:
-        return RAW, f"messages encoded as {encoding[0]!r} with a schema in {encoding[1]!r} are not decoded"
-    try:
-        message = parsers[encoding](schema.name, schema.data.decode())
-    except (InputError, ValueError) as error:
-        return RAW, f"the schema cannot be read: {error}"
-    return (message, "") if supported(message) else (RAW, "wide strings are not decoded")
-
-
-def _raw(payloads: Payloads) -> Table:
-    ends = payloads.start + payloads.size
-    pieces = (payloads.data[a:b].tobytes() for a, b in zip(payloads.start.tolist(), ends.tolist(), strict=True))
-    table = np.zeros(len(payloads), [("data", object)])
-    table["data"] = np.fromiter(pieces, object, len(payloads))
-    return table
 
 
 def open_log(path: str | os.PathLike[str]) -> LogFile:

@@ -235,7 +235,7 @@ class Cursor:
         block = self.block()
         if len(block) % 10:
             raise damaged(self.path, self.origin + start, f"a map of {len(block)} bytes, not a multiple of 10")
-        return {key: value for key, value in struct.iter_unpack("<HQ", block)}
+        return dict(struct.iter_unpack("<HQ", block))
 
     def head(self) -> tuple[int, int]:
         """A record's opcode and length; InputError if the record does not fit."""
@@ -273,12 +273,15 @@ def read_chunk_index(c: Cursor) -> ChunkIndex:
 
 
 def read_attachment_index(c: Cursor) -> AttachmentIndex:
-    return AttachmentIndex(*c.numbers("QQQQQ"), c.text(), c.text())  # type: ignore[misc]
+    offset, length, log_time, create_time, size = c.numbers("QQQQQ")
+    return AttachmentIndex(offset, length, log_time, create_time, size, c.text(), c.text())
 
 
 def read_metadata_index(c: Cursor) -> MetadataIndex:
-    return MetadataIndex(*c.numbers("QQ"), c.text())  # type: ignore[misc]
+    offset, length = c.numbers("QQ")
+    return MetadataIndex(offset, length, c.text())
 
 
 def read_statistics(c: Cursor) -> Statistics:
-    return Statistics(*c.numbers("QHIIIIQQ"), c.number_map())  # type: ignore[misc]
+    messages, schemas, channels, attachments, metadata, chunks, start, end = c.numbers("QHIIIIQQ")
+    return Statistics(messages, schemas, channels, attachments, metadata, chunks, start, end, c.number_map())

@@ -7,7 +7,10 @@ from ..schemas.definition import SEPARATOR, MessageType
 _TIME = re.compile(r"^(\s*)(time|duration)(\[\d*\])?(\s)", re.MULTILINE)
 _HEADER = re.compile(r"^(\s*)Header(\[\d*\])?(\s)", re.MULTILINE)
 _TYPES = {"time": "ros1/Time", "duration": "ros1/Duration"}
-_DEFINED = f"\n{SEPARATOR}\nMSG: ros1/Time\nuint32 sec\nuint32 nanosec\n{SEPARATOR}\nMSG: ros1/Duration\nint32 sec\nint32 nanosec\n"
+_DEFINED = "".join(
+    f"\n{SEPARATOR}\nMSG: ros1/{name}\n{kind} sec\n{kind} nanosec\n"
+    for name, kind in (("Time", "uint32"), ("Duration", "int32"))
+)
 
 
 def parse_ros1(name: str, text: str) -> MessageType:

@@ -172,7 +172,7 @@ def _place(dtype: "np.dtype[Any]", path: Path) -> "tuple[int, np.dtype[Any]]":
 
 
 def _runs(data: NDArray[Any], slots: list[Slot]) -> list[tuple[Slot, int]]:
-    """Slots that lie side by side in the data as in the message, and need no conversion, are moved as one (size > 0)."""
+    """Slots that lie side by side in the data as in the message and need no conversion become one move (size > 0)."""
     runs: list[tuple[Slot, int]] = []
     previous_end = (-1, -1)
     for slot in slots:

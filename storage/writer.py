@@ -1,7 +1,7 @@
 """`write`: columns to a new MCAP file."""
 
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -106,7 +106,7 @@ def channel_metadata(channel: Channel) -> dict[str, str]:
     return {QOS_KEY: QOS, **channel.metadata}
 
 
-def free_ids(taken: set[int], first: int) -> "Iterable[int]":
+def free_ids(taken: set[int], first: int) -> Iterator[int]:
     """Ids from ``first`` up, then the lowest free ones; StorageError when all 65,535 are used."""
     for number in [*range(first, 65536), *range(1, first)]:
         if number not in taken:
