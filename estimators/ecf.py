@@ -11,12 +11,13 @@ Each step uses its own interval and this sample's measurement with the attitude 
 R_k = R_k-1 Exp((gyro_k - b + kp w_mes) dt). A magnetometer slower than the IMU acts at its own samples, for its own
 interval. What flight needs beyond (3), and what switches it off:
 
-* ``heading_only``: the field turns the estimate about the vertical alone, by the sine of the heading error times
-  cos(dip) of the first field over that of the moment, so that a wrong dip or a disturbed field does not tilt it. False
-  gives (3) as it stands, with m0 the first field.
-* ``gate``: an accelerometer that reads g + x counts 1 / (1 + (x / gate)^2). ``inf`` gives (3).
-
-The bias starts from rest where the log begins at rest.
+* ``heading_only``: the field turns the estimate about the vertical alone, by the sine of the heading error, so that a
+  wrong dip or a disturbed field does not tilt it. False: as (3) stands, m0 being the first field.
+* ``gate``: the force enters as f/g, whose mean is right however hard one shakes, and counts 1 / (1 + (a / gate)^2)
+  where a is the acceleration of the last ``motion_s``. inf: f/|f|, always.
+* ``mag_gate``: a field whose length is off the usual one by a share x counts 1 / (1 + (x / mag_gate)^2). inf: always.
+* ``ki_start``: where the log does not begin at rest the bias is sought faster, and accelerations are doubted less, for
+  ``settle_s``. 0 with a rest at the start: (2).
 """
 
 import math
@@ -38,11 +39,17 @@ class Parameters(MargParameters):
     """Gains of (1) to (3)."""
 
     kp: float = quantity(1.0, "1/s", "gain of the attitude, times k_acc and k_mag")
-    ki: float = quantity(0.05, "1/s^2", "gain of the bias, times k_acc and k_mag")
-    k_acc: float = quantity(0.3, "", "weight of the accelerometer")
-    k_mag: float = quantity(0.3, "", "weight of the magnetometer")
-    gate: float = quantity(2.0, "m/s^2", "recent acceleration at which the accelerometer counts half", minimum=1e-6)
-    motion_s: float = quantity(1.0, "s", "how long an acceleration counts as recent", minimum=1e-3)
+    ki: float = quantity(0.005, "1/s^2", "gain of the bias, times k_acc and k_mag")
+    ki_start: float = quantity(0.1, "1/s^2", "added to ki while a bias settles that no rest has shown")
+    settle_s: float = quantity(30.0, "s", "time constant of that", minimum=1e-3)
+    k_acc: float = quantity(0.2, "", "weight of the accelerometer")
+    k_mag: float = quantity(0.1, "", "weight of the magnetometer")
+    gate: float = quantity(2.5, "m/s^2", "recent acceleration at which the accelerometer counts half", minimum=1e-6)
+    motion_s: float = quantity(0.5, "s", "how long an acceleration counts as recent", minimum=1e-3)
+    mag_gate: float = quantity(
+        0.05, "", "relative difference from the usual field at which it counts half", minimum=1e-6
+    )
+    mag_memory_s: float = quantity(120.0, "s", "time over which the usual field is learnt", minimum=1e-3)
     heading_only: bool = choice(True, "the magnetometer turns about the vertical only")
 
 
@@ -58,15 +65,20 @@ def run(recording: Recording, parameters: Parameters) -> Estimate:
         constants = ecf_kernel.Constants(
             parameters.kp,
             parameters.ki,
+            parameters.ki_start,
+            1.0 / parameters.settle_s,
             parameters.k_acc,
             parameters.k_mag,
             GRAVITY,
             1.0 / parameters.gate**2,
             1.0 / parameters.motion_s,
+            1.0 / parameters.mag_gate**2,
+            1.0 / parameters.mag_memory_s,
             m0,
             parameters.heading_only,
         )
-        return constants, (start.orientation, start.bias, 0.0)
+        strength = math.hypot(*start.field) if start.field else 0.0
+        return constants, (start.orientation, start.bias, 0.0, strength, float(math.isnan(start.bias_sigma)))
 
     each_run(inputs, ecf_kernel.run, begin, output, mag=True)
     return result("ecf", inputs, dict(zip(("orientation", "angular_velocity", "gyro_bias"), output, strict=True)))

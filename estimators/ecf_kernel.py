@@ -6,28 +6,45 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..geometry.jit import kernel, part
-from ..geometry.kernels import Quaternion, Vector, cross, exponential, matrix, multiply, norm, renormalize, turned
-from ..geometry.kernels import turned_back
+from ..geometry.kernels import (
+    Quaternion,
+    Vector,
+    cross,
+    exponential,
+    matrix,
+    multiply,
+    norm,
+    renormalize,
+    turned,
+    turned_back,
+)
 from ..schemas.estimate import Status
 from .loop_kernel import Floats, Span, Times, march
 
-State = tuple[Quaternion, Vector, float]
+State = tuple[Quaternion, Vector, float, float, float]
+"""Attitude, bias, recent acceleration over the gate squared, usual field strength, what is left of the settling."""
 Output = tuple[Floats, Floats, Floats]
 
 ACCELEROMETER_REJECTED = int(Status.ACCELEROMETER_REJECTED)
 MAGNETOMETER_REJECTED = int(Status.MAGNETOMETER_REJECTED)
+DROWNED = 8.0
+"""A sensor is marked as rejected where it weighs less than a ninth of what it does at best."""
 
 
 class Constants(NamedTuple):
-    """Gains of eq 7-10; ``m0`` is the world's magnetic direction; ``gate`` softens the accelerometer (m/s^2)."""
+    """Gains of (1) to (3); ``gate`` and ``mag_gate`` are one over their squares, ``m0`` the field in the world."""
 
     kp: float
     ki: float
+    ki_start: float
+    settle_rate: float
     k_acc: float
     k_mag: float
     gravity: float
     gate: float
     motion_rate: float
+    mag_gate: float
+    forget: float
     m0: Vector
     heading_only: bool
 
@@ -37,7 +54,8 @@ def step(
     c: Constants, state: State, dt: float, rate: Vector, force: Vector, dt_mag: float, field: Vector
 ) -> tuple[State, Vector, int]:
     """Sample k: w_mes from the attitude of k - 1, then R_k = R_k-1 Exp((gyro - b + kp w_mes) dt)."""
-    q, b, motion = state
+    q, b, motion, usual, settling = state
+    flags = 0
     rotation = matrix(q)
     up = (rotation[6], rotation[7], rotation[8])  # v_hat of gravity: R^T e_z
     wx = wy = wz = 0.0  # w_mes, times the interval of the sensor that it comes from
@@ -47,13 +65,20 @@ def step(
         if c.gate > 0.0:
             x, y, z = force[0] - c.gravity * up[0], force[1] - c.gravity * up[1], force[2] - c.gravity * up[2]
             motion += min(c.motion_rate * dt, 1.0) * ((x * x + y * y + z * z) * c.gate - motion)
-            weight = c.k_acc * dt / (c.gravity * (1.0 + motion))
+            weight = c.k_acc * dt / (c.gravity * (1.0 + motion * (1.0 - settling * settling)))
+            if motion > DROWNED:
+                flags |= ACCELEROMETER_REJECTED
         e = cross(force, up)
         wx, wy, wz = weight * e[0], weight * e[1], weight * e[2]
     if dt_mag > 0.0:
         strength = norm(field)
         if strength > 0.0:
-            weight = c.k_mag * dt_mag / strength
+            odd = (strength / usual - 1.0) if usual > 0.0 else 0.0
+            odd = odd * odd * c.mag_gate
+            usual = usual + min(dt_mag * c.forget, 1.0) * (strength - usual) if usual > 0.0 else strength
+            weight = c.k_mag * dt_mag / (strength * (1.0 + odd))
+            if odd > DROWNED:
+                flags |= MAGNETOMETER_REJECTED
             if c.heading_only:
                 f = turned(rotation, field)
                 weight = weight * (f[0] * c.m0[1] - f[1] * c.m0[0])
@@ -63,14 +88,16 @@ def step(
             wx, wy, wz = wx + weight * e[0], wy + weight * e[1], wz + weight * e[2]
     u = (rate[0] - b[0], rate[1] - b[1], rate[2] - b[2])
     turn = exponential(u[0] * dt + c.kp * wx, u[1] * dt + c.kp * wy, u[2] * dt + c.kp * wz)
-    b = (b[0] - c.ki * wx, b[1] - c.ki * wy, b[2] - c.ki * wz)
-    return (multiply(renormalize(q), turn), b, motion), u, 0
+    ki = c.ki + c.ki_start * settling
+    b = (b[0] - ki * wx, b[1] - ki * wy, b[2] - ki * wz)
+    settling -= settling * min(c.settle_rate * dt, 1.0)
+    return (multiply(renormalize(q), turn), b, motion, usual, settling), u, flags
 
 
 @part
 def write(output: Output, k: int, c: Constants, state: State, u: Vector) -> None:
     orientation, angular_velocity, gyro_bias = output
-    q, b, _ = state
+    q, b, _, _, _ = state
     for i in range(4):
         orientation[k, i] = q[i]
     for i in range(3):

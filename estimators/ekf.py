@@ -20,12 +20,13 @@ that the result does not hang on the log's rate. What flight needs:
   dip adds noise, ``mag_excess`` times the relative difference; the usual field is learnt over ``mag_memory_s``.
 * A rate that changes between two samples adds noise: half the change, times ``rate_error``.
 
-The innovations are the two tilt angles and the heading, rad. ``attitude_covariance`` and the state's are turned into the
-body; the state's first three are the correction just made.
+The innovations are the two tilt angles and the heading, rad. ``attitude_covariance`` and the state's are turned into
+the body; the state's first three are the correction just made.
 """
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from ..schemas.estimate import Estimate
 from ..schemas.recording import Recording
@@ -35,6 +36,9 @@ from .output import block, result
 from .parameters import ImuParameters, MargParameters, quantity
 from .registry import Estimator
 from .runs import each_run
+
+if TYPE_CHECKING:
+    from .ekf_kernel import Covariance
 
 STATE_NAMES = (
     "attitude_error_x",
@@ -52,13 +56,13 @@ class Noise(ImuParameters):
     """Noise of gyro and accelerometer, and what is known of the bias at the start."""
 
     gyro_lag_s: float = quantity(0.002, "s", "delay of the gyro's own filters, made up for")
-    gyro_noise: float = quantity(0.0015, "rad/s/rtHz", "density of the gyro's noise")
-    bias_walk: float = quantity(0.0001, "rad/s/rts", "random walk of the gyro's bias")
+    gyro_noise: float = quantity(0.0006, "rad/s/rtHz", "density of the gyro's noise")
+    bias_walk: float = quantity(0.00004, "rad/s/rts", "random walk of the gyro's bias")
     bias_sigma: float = quantity(0.02, "rad/s", "bias at the start, where no rest shows it")
-    rate_error: float = quantity(0.1, "", "share of a step's rate change that is error")
-    scale_error: float = quantity(0.007, "1/rtHz", "gyro noise per rad/s of turning: scale and misalignment")
-    acc_noise: float = quantity(0.2, "m/s^2/rtHz", "density of linear acceleration", minimum=1e-9)
-    acc_motion: float = quantity(0.5, "1/rtHz", "more of it per m/s^2 of recent acceleration")
+    rate_error: float = quantity(0.04, "", "share of a step's rate change that is error")
+    scale_error: float = quantity(0.003, "1/rtHz", "gyro noise per rad/s of turning: scale and misalignment")
+    acc_noise: float = quantity(0.08, "m/s^2/rtHz", "density of linear acceleration", minimum=1e-9)
+    acc_motion: float = quantity(0.16, "1/rtHz", "more of it per m/s^2 of recent acceleration")
     motion_s: float = quantity(1.0, "s", "how long an acceleration counts as recent", minimum=1e-3)
 
 
@@ -71,8 +75,8 @@ class Ekf6(Noise):
 class Ekf9(Noise, MargParameters):
     """Nine axes."""
 
-    mag_noise: float = quantity(0.04, "rad/rtHz", "density of the heading's noise", minimum=1e-9)
-    mag_excess: float = quantity(6.0, "rad/rtHz", "more of it per relative difference from the usual field")
+    mag_noise: float = quantity(0.016, "rad/rtHz", "density of the heading's noise", minimum=1e-9)
+    mag_excess: float = quantity(2.4, "rad/rtHz", "more of it per relative difference from the usual field")
     mag_memory_s: float = quantity(120.0, "s", "time over which the usual field is learnt", minimum=1e-3)
 
 
@@ -145,10 +149,11 @@ def _usual(start: Start) -> tuple[float, float, float]:
     return math.hypot(x, y), z, x * x + y * y + z * z
 
 
-def _covariance(start: Start, noise: Noise) -> tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]:
+def _covariance(start: Start, noise: Noise) -> "Covariance":
     tilt, heading = start.tilt_sigma**2, start.heading_sigma**2
     bias = (noise.bias_sigma if math.isnan(start.bias_sigma) else start.bias_sigma) ** 2
-    return (tilt, 0.0, 0.0, tilt, 0.0, heading), (0.0,) * 9, (bias, 0.0, 0.0, bias, 0.0, bias)
+    none = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    return (tilt, 0.0, 0.0, tilt, 0.0, heading), none, (bias, 0.0, 0.0, bias, 0.0, bias)
 
 
 EKF9 = Estimator(

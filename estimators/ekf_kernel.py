@@ -5,16 +5,14 @@ blocks: ``A`` (attitude, symmetric, upper half row by row), ``C`` (attitude x bi
 """
 
 import math
-from typing import Any, NamedTuple, TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..geometry.jit import part
-from ..geometry.kernels import Matrix, Quaternion, Vector, exponential, matrix, multiply, norm, renormalize, turned
+from ..geometry.kernels import Matrix, Quaternion, Vector, exponential, matrix, multiply, renormalize, turned
 from ..schemas.estimate import Status
 from .gyro_kernel import interval_turn
-from .loop_kernel import Floats, Span, Times, march
 
 Symmetric: TypeAlias = tuple[float, float, float, float, float, float]
 Covariance: TypeAlias = tuple[Symmetric, Matrix, Symmetric]
@@ -22,10 +20,14 @@ Correction: TypeAlias = tuple[float, float, float, float, float, float]
 
 ACCELEROMETER_REJECTED = int(Status.ACCELEROMETER_REJECTED)
 MAGNETOMETER_REJECTED = int(Status.MAGNETOMETER_REJECTED)
+DROWNED = 8.0
+"""A sensor is marked as rejected where its noise is this many times what it is at best: it weighs a ninth."""
+OUTLIER = 25.0
+"""A heading further off than 5 standard deviations counts as just that far: bounded influence, and no lock-out."""
 
 
 class Constants(NamedTuple):
-    """Noise as densities squared (per Hz); ``north`` is the horizontal unit vector of the field, east and north."""
+    """Noise as densities squared (per Hz); ``north`` is the field's horizontal direction, east and north."""
 
     lag: float
     gyro: float
@@ -44,7 +46,8 @@ class Constants(NamedTuple):
 
 
 class State(NamedTuple):
-    """After a sample; ``motion`` is the mean square of acceleration, in g; ``horizontal`` and ``vertical`` are the field that the filter has come to know."""
+    """After a sample. ``motion`` is the recent mean square acceleration, in g^2; ``horizontal`` and ``vertical`` are
+    the field that the filter has come to know."""
 
     q: Quaternion
     b: Vector
@@ -160,6 +163,8 @@ def step(
         moved = max(tilt_x * tilt_x + tilt_y * tilt_y + lift * lift - (prior[0] + prior[3]), 0.0)
         motion += min(c.motion_rate * dt, 1.0) * (moved - motion)
         noise_tilt = (c.force + c.force_motion * motion) * per_s
+        if c.force_motion * motion > DROWNED * c.force:
+            flags |= ACCELEROMETER_REJECTED
         a, x, _ = P
         P, d = condition(P, (a[0], a[1], a[2], x[0], x[1], x[2]), a[0] + noise_tilt, tilt_x - d[0], d)
         a, x, _ = P
@@ -175,6 +180,12 @@ def step(
             odd = ((level - horizontal) ** 2 + (f[2] - vertical) ** 2) * c.per_strength2
             noise_heading = (c.field + c.field_excess * odd) / dt_mag
             a, x, _ = P
+            bound = heading * heading / OUTLIER - a[5]
+            if bound > noise_heading:
+                noise_heading = bound
+                flags |= MAGNETOMETER_REJECTED
+            if c.field_excess * odd > DROWNED * c.field:
+                flags |= MAGNETOMETER_REJECTED
             s = a[5] + noise_heading
             P, d = condition(P, (a[2], a[4], a[5], x[6], x[7], x[8]), s, heading - d[2], d)
             share = dt_mag * c.forget

@@ -11,9 +11,7 @@ from ..geometry.kernels import Matrix, Quaternion, Vector, matrix, turned_back
 from .ekf_kernel import Constants, Report, State, Symmetric, step
 from .loop_kernel import Floats, Span, Times, march
 
-Output: TypeAlias = tuple[
-    Floats, Floats, Floats, Floats, Floats, Floats, Floats, Floats, Floats, Floats, Floats
-]
+Output: TypeAlias = tuple[Floats, Floats, Floats, Floats, Floats, Floats, Floats, Floats, Floats, Floats, Floats]
 """orientation, angular_velocity, gyro_bias, attitude_covariance, rpy_sigma_deg, rate_sigma, bias_sigma, state,
 state_covariance, innovation, innovation_covariance: fields of Estimate, each (n, width)."""
 

@@ -1,6 +1,5 @@
 """The gate before every estimator: one IMU and at most one magnetometer, usable samples only, cut where time breaks."""
 
-import dataclasses
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,7 +24,7 @@ MAX_FINDINGS = 50
 
 @dataclass(frozen=True)
 class Run:
-    """Samples first to last - 1 without a break; ``fresh``: nothing is known from before (start, reboot, clock step)."""
+    """Samples first to last - 1, unbroken; ``fresh``: nothing is known from before (start, reboot, clock step)."""
 
     first: int
     last: int
@@ -93,11 +92,6 @@ def prepare(recording: Recording, parameters: ImuParameters, *, mag: bool, needs
     )  # fmt: skip
 
 
-def without_mag(inputs: Inputs) -> Inputs:
-    """The same inputs for a filter's steps when the magnetometer only served to begin with."""
-    return dataclasses.replace(inputs, mag_time_ns=inputs.mag_time_ns[:0], field=inputs.field[:0])
-
-
 def _imu(recording: Recording, number: int) -> tuple[Times, Floats, Floats, str, list[Finding]]:
     imu = recording.imu.get(number)
     if imu is None:
@@ -109,7 +103,7 @@ def _imu(recording: Recording, number: int) -> tuple[Times, Floats, Floats, str,
         raise InputError(f"{topic}: {len(time_ns)} stamps, {len(rate)} rates and {len(force)} forces do not match")
     findings: list[Finding] = []
     if not (np.isfinite(rate.sum()) and np.isfinite(force.sum())):
-        good = np.isfinite(rate).all(axis=1) & np.isfinite(force).all(axis=1)
+        good = np.isfinite(rate.sum(axis=1)) & np.isfinite(force.sum(axis=1))
         findings += _skipped(time_ns, good, topic)
         time_ns, rate, force = time_ns[good], rate[good], force[good]
     if len(time_ns) == 0:
@@ -136,12 +130,11 @@ def _mag(
     if len(field) != len(time_ns):
         raise InputError(f"{topic}: {len(time_ns)} stamps and {len(field)} fields do not match")
     findings: list[Finding] = []
-    total = np.abs(field).sum(axis=1) if len(field) < 2 or not field.any(axis=1).all() else field.sum(axis=1)
-    if not np.isfinite(total.sum()) or not np.all(total):
-        good = np.isfinite(field).all(axis=1) & field.any(axis=1)
-        if not good.all():
-            findings += _skipped(time_ns, good, topic)
-            time_ns, field = time_ns[good], field[good]
+    square = np.einsum("ij,ij->i", field, field)
+    good = np.isfinite(square) & (square > 0.0)
+    if not good.all():
+        findings += _skipped(time_ns, good, topic)
+        time_ns, field = time_ns[good], field[good]
     if np.any(time_ns[1:] < time_ns[:-1]):
         order = np.argsort(time_ns, kind="stable")
         time_ns, field = time_ns[order], field[order]
@@ -170,8 +163,7 @@ def _median_s(intervals: NDArray[np.int64]) -> float:
 
 def _runs(recording: Recording, time_ns: Times, intervals: NDArray[np.int64], max_gap_s: float) -> tuple[Run, ...]:
     starts = {0: True}
-    for index in np.flatnonzero(intervals > max_gap_s * 1e9):
-        starts[int(index) + 1] = False
+    starts |= {index + 1: False for index in np.flatnonzero(intervals > max_gap_s * 1e9).tolist()}
     for segment in recording.segments:
         index = int(np.searchsorted(time_ns, segment.start_ns))
         if index < len(time_ns):

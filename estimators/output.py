@@ -1,5 +1,7 @@
 """Empty results: one block of memory for all that a kernel fills, shared NaN for all that it does not."""
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -47,7 +49,7 @@ def result(
 ) -> Estimate:
     """An Estimate of ``filled``, NaN elsewhere; `attlog.estimators.estimate` sets its name and parameters."""
     n = len(inputs.time_ns)
-    fields = {key: filled[key] if key in filled else nothing(n, width) for key, width in WIDTHS.items()}
+    fields: dict[str, Any] = {key: filled[key] if key in filled else nothing(n, width) for key, width in WIDTHS.items()}
     return Estimate(
         name=name,
         estimator=name,

@@ -43,8 +43,10 @@ def parse(text: str) -> Selection:
     known = [field.name for field in dataclasses.fields(estimator.parameters)]
     for key in options:
         if key not in known:
-            raise UsageError(f"{estimator.name} has no parameter {key!r}. It has: {', '.join([*known, 'preset', 'as'])}")
-    values = {key: _value(estimator.name, key, value, hints[key]) for key, value in options.items()}
+            raise UsageError(
+                f"{estimator.name} has no parameter {key!r}. It has: {', '.join([*known, 'preset', 'as'])}"
+            )
+    values: dict[str, Any] = {key: _value(estimator.name, key, value, hints[key]) for key, value in options.items()}
     parameters = dataclasses.replace(base, **values)
     check(parameters)
     name = _default_name(estimator, parameters, preset) if given_name is None else given_name

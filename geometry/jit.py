@@ -32,7 +32,7 @@ def part(function: Callable[P, R]) -> Callable[P, R]:
 
 def _stamped(dispatcher: Any) -> Any:
     """Numba keeps machine code as long as the kernel's own file is unchanged; its pieces may lie in others."""
-    kept = getattr(getattr(dispatcher, "_cache", None), "_cache_file", None)
+    kept: Any = getattr(getattr(dispatcher, "_cache", None), "_cache_file", None)
     if hasattr(kept, "_source_stamp"):
         kept._source_stamp = f"{kept._source_stamp} {_sources()}"
     return dispatcher
