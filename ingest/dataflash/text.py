@@ -1,6 +1,7 @@
 """Text DataFlash logs: lines of values, one type a line, to the same structured arrays as a binary log's."""
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from typing import Final
 
@@ -26,6 +27,9 @@ KIND: Final = {
     "L": DEGREES,
 }
 """Format character -> how its values are written."""
+LONGEST: Final = 256
+"""No value is written with more characters; a line that has one has lost its end."""
+ROWS_AT_ONCE: Final = 65_536
 
 
 class Lines:
@@ -44,6 +48,7 @@ class Lines:
         """The lines ``chosen`` as records of a format; a line that does not fit is left out."""
         kinds = np.array([KIND[character] for character in form.characters], np.int64)
         whole, starts, stops, state = values(self.raw, self.begins[chosen], self.ends[chosen], kinds)
+        state[stops - starts > LONGEST] = MISSING
         modes = [i for i, c in enumerate(form.characters) if c == "M" and np.any(state[:, i] == UNUSUAL)]
         if modes:
             named = "".join("N" if i in modes else c for i, c in enumerate(form.characters))
@@ -56,14 +61,14 @@ class Lines:
     def _unusual(
         self, form: Format, whole: Ints, starts: Ints, stops: Ints, state: NDArray[np.uint8]
     ) -> NDArray[np.bool_]:
-        """Let Python read what the kernel would not; which lines it could."""
+        """Read in other ways what the kernel would not, such as 17 digits; which lines that was possible for."""
         good = np.ones(len(whole), np.bool_)
-        for row, column in np.argwhere(state == UNUSUAL).tolist():
-            token = self.raw[starts[row, column] : stops[row, column]].tobytes()
-            try:
-                whole[row, column] = _bits(token.decode("ascii"), KIND[form.characters[column]])
-            except (ValueError, OverflowError):
-                good[row] = False
+        for column, character in enumerate(form.characters):
+            rows = np.flatnonzero(state[:, column] == UNUSUAL)
+            if len(rows):
+                tokens = self._strings(starts[rows, column], stops[rows, column])
+                whole[rows, column], fits = _other_numbers(tokens, KIND[character])
+                good[rows] &= fits
         return good
 
     def _table(self, form: Format, whole: Ints, starts: Ints, stops: Ints) -> Table:
@@ -84,10 +89,13 @@ class Lines:
 
     def _strings(self, starts: Ints, stops: Ints) -> NDArray[np.bytes_]:
         width = max(1, int((stops - starts).max(initial=1)))
-        at = starts[:, np.newaxis] + np.arange(width)
-        inside = at < stops[:, np.newaxis]
-        matrix = np.where(inside, self.raw[np.minimum(at, len(self.raw) - 1)], np.uint8(0))
-        return np.ascontiguousarray(matrix).view(f"S{width}")[:, 0]
+        matrix = np.zeros((len(starts), width), np.uint8)
+        for first in range(0, len(starts), ROWS_AT_ONCE):
+            rows = slice(first, first + ROWS_AT_ONCE)
+            at = starts[rows, np.newaxis] + np.arange(width)
+            inside = at < stops[rows, np.newaxis]
+            matrix[rows][inside] = self.raw[at[inside]]
+        return matrix.view(f"S{width}")[:, 0]
 
 
 def parse(data: Bytes) -> Log:
@@ -158,6 +166,21 @@ def _in_range(form: Format, whole: Ints) -> NDArray[np.bool_]:
 
 def _unpacked(name: int) -> str:
     return "" if name < 0 else name.to_bytes(8, "big").lstrip(b"\0").decode("latin-1")
+
+
+def _other_numbers(tokens: NDArray[np.bytes_], kind: int) -> tuple[Ints, NDArray[np.bool_]]:
+    """Numbers (n,) as `values` leaves them, all at once if each is a real number; and which tokens are numbers."""
+    good = np.ones(len(tokens), np.bool_)
+    if kind == REAL:
+        with suppress(ValueError):
+            return tokens.astype(np.float64).view(np.int64), good
+    bits = np.zeros(len(tokens), np.int64)
+    for row, token in enumerate(tokens.tolist()):
+        try:
+            bits[row] = _bits(token.decode("ascii"), kind)
+        except (ValueError, OverflowError):
+            good[row] = False
+    return bits, good
 
 
 def _bits(token: str, kind: int) -> int:

@@ -134,6 +134,7 @@ def test_lines_that_do_not_fit_are_counted(flight: Any, ingest: Any) -> None:
         "IMU, x, 0, 1, 2, 3, 4, 5, 6",
         "IMU, 12, 256, 1, 2, 3, 4, 5, 6",
         "HUH, 1, 2",
+        "MSG, 12, " + "long " * 10_000 + "!",
         "\x01\x02",
     ]
     text = "\n".join([*log.lines, *broken]).encode()
