@@ -36,6 +36,7 @@ FORMATS: Mapping[str, Format] = {
     form.name: form
     for form in (
         Format("dataflash", "ArduPilot DataFlash log, binary (.bin) or text (.log)", "dataflash"),
+        Format("ulog", "PX4 ULog (.ulg)", "ulog"),
         Format("mavlink", "MAVLink telemetry log (.tlog) or raw MAVLink 1 and 2 stream", "mavlink"),
     )
 }
