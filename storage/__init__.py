@@ -1,9 +1,10 @@
 """Columns to MCAP bytes and back."""
 
+from .annotate import annotate
 from .channels import ChannelInfo
 from .logfile import LogFile
 from .logfile import open_log as open
 from .records import Attachment, Statistics
 from .writer import write
 
-__all__ = ["Attachment", "ChannelInfo", "LogFile", "Statistics", "open", "write"]
+__all__ = ["Attachment", "ChannelInfo", "LogFile", "Statistics", "annotate", "open", "write"]

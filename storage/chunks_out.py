@@ -41,7 +41,7 @@ class ChunkWriter:
 
     def write(self, outlets: Sequence[Outlet], plan: Schedule) -> None:
         """All messages; each chunk begins with the schemas and channels that are used in it for the first time."""
-        intros = _introductions(outlets, plan, set(self.contents.schemas))
+        intros = _introductions(outlets, plan)
         for outlet in outlets:
             self.contents.schemas[outlet.schema.id] = outlet.schema
             self.contents.channels[outlet.channel.id] = outlet.channel
@@ -136,8 +136,9 @@ def _note(
             span[1] = max(span[1], int(times[high - 1]))
 
 
-def _introductions(outlets: Sequence[Outlet], plan: Schedule, known: set[int]) -> dict[int, bytes]:
+def _introductions(outlets: Sequence[Outlet], plan: Schedule) -> dict[int, bytes]:
     """Chunk number -> the schema and channel records that it must begin with."""
+    known: set[int] = set()
     firsts: dict[int, list[Outlet]] = {}
     for outlet, bounds in zip(outlets, plan.bounds, strict=True):
         if len(outlet.rows.time_ns):
@@ -154,11 +155,8 @@ def _introductions(outlets: Sequence[Outlet], plan: Schedule, known: set[int]) -
     return intros
 
 
-def write_idle(sink: Sink, outlets: Sequence[Outlet], known: set[int]) -> None:
+def write_idle(sink: Sink, outlets: Sequence[Outlet]) -> None:
     """The records of channels without messages, outside of any chunk."""
     for outlet in outlets:
         if len(outlet.rows.time_ns) == 0:
-            if outlet.schema.id not in known:
-                known.add(outlet.schema.id)
-                sink.write(outlet.schema.pack())
-            sink.write(outlet.channel.pack())
+            sink.write(outlet.schema.pack() + outlet.channel.pack())

@@ -45,8 +45,10 @@ class Index:
     spans: list[tuple[int, int]] = field(default_factory=list)
     attachments: list[AttachmentIndex] = field(default_factory=list)
     metadata: list[MetadataIndex] = field(default_factory=list)
+    definitions: list[tuple[int, int, int, int]] = field(default_factory=list)
+    """(offset, length, opcode, id) of schemas and channels outside any chunk."""
     others: list[tuple[int, int]] = field(default_factory=list)
-    """(offset, length) of records of kinds that the format leaves to others."""
+    """(offset, length) of the Header and of records of kinds that the format leaves to others."""
     data_end: int = 0
 
 
@@ -101,16 +103,18 @@ def _read_summary(file: InputFile, index: Index, start: int, end: int, checksum:
             index.metadata.append(read_metadata_index(content))
 
 
-def _add_schema(index: Index, content: Cursor) -> None:
+def _add_schema(index: Index, content: Cursor) -> int:
     schema = read_schema(content)
     if schema.id == 0:
         raise damaged(content.path, content.origin, "a schema with the id 0")
     index.schemas[schema.id] = schema
+    return schema.id
 
 
-def _add_channel(index: Index, content: Cursor) -> None:
+def _add_channel(index: Index, content: Cursor) -> int:
     channel = read_channel(content)
     index.channels[channel.id] = channel
+    return channel.id
 
 
 def _data_end(file: InputFile, limit: int) -> int:
@@ -174,7 +178,8 @@ class _Walker:
         if op == Op.CHUNK:
             self.chunk = chunk_head(self.file, at, length)
         elif op in (Op.HEADER, Op.SCHEMA, Op.CHANNEL):
-            self.definition(op, Cursor(self.file.peek(at + RECORD_HEAD, length), self.file.path, at + RECORD_HEAD))
+            content = Cursor(self.file.peek(at + RECORD_HEAD, length), self.file.path, at + RECORD_HEAD)
+            self.definition(op, content, at, end - at)
         elif op == Op.ATTACHMENT:
             self.index.attachments.append(self.attachment(at, end - at))
         elif op == Op.METADATA:
@@ -184,13 +189,13 @@ class _Walker:
             self.index.others.append((at, end - at))
         return end
 
-    def definition(self, op: int, content: Cursor) -> None:
+    def definition(self, op: int, content: Cursor, at: int, length: int) -> None:
         if op == Op.HEADER:
             self.index.profile, self.index.library = content.text(), content.text()
-        elif op == Op.SCHEMA:
-            _add_schema(self.index, content)
-        else:
-            _add_channel(self.index, content)
+            self.index.others.append((at, length))
+            return
+        number = _add_schema(self.index, content) if op == Op.SCHEMA else _add_channel(self.index, content)
+        self.index.definitions.append((at, length, op, number))
 
     def message(self, at: int, end: int) -> None:
         if self.span and self.span[1] == at and end - self.span[0] <= SPAN_SIZE:

@@ -19,7 +19,9 @@ class InputFile:
             self._file = open(path, "rb", buffering=0)  # noqa: SIM115 - closed by close()
         except OSError as error:
             raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
-        self.size = os.fstat(self._file.fileno()).st_size
+        status = os.fstat(self._file.fileno())
+        self.size = status.st_size
+        self._identity = _identity(status)
         self._window = (0, b"")
         self._buffer = memoryview(bytearray())
 
@@ -63,6 +65,13 @@ class InputFile:
             self._window = start, window = offset, window
         return window[offset - start : offset - start + length]
 
+    def is_current(self) -> bool:
+        """Whether the path still leads to this file, and nobody has written to it."""
+        try:
+            return _identity(os.stat(self.path)) == self._identity
+        except OSError:
+            return False
+
     def close(self) -> None:
         """Close the file."""
         self._file.close()
@@ -72,3 +81,7 @@ class InputFile:
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
         self.close()
+
+
+def _identity(status: os.stat_result) -> tuple[int, ...]:
+    return status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns

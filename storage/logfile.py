@@ -146,7 +146,7 @@ class LogFile:
             records, indexes = reader.load(chunk)
             found = reader.indexed(chunk, indexes) if chunk.message_indexes else reader.scanned(records)
             yield records, _wanted(found, wanted)
-        for records in self._loose():
+        for records in self.loose():
             yield records, _wanted(reader.scanned(records), wanted)
 
     def _collect(
@@ -213,12 +213,14 @@ class LogFile:
                 yield from reader.indexed(chunk, indexes).items()
             else:
                 yield from reader.scanned(reader.load(chunk)[0]).items()
-        for records in self._loose():
+        for records in self.loose():
             yield from reader.scanned(records).items()
 
-    def _loose(self) -> Iterator[Records]:
-        """The messages outside chunks."""
+    def loose(self, only: int | None = None) -> Iterator[Records]:
+        """The messages outside chunks, part by part, or the part at the offset ``only``."""
         for offset, length in self.index.spans:
+            if only not in (None, offset):
+                continue
             yield Records(np.frombuffer(self.file.view(offset, length), np.uint8), offset)
 
     def _complete(self) -> None:

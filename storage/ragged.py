@@ -1,5 +1,7 @@
 """Runs of bytes of different lengths, copied many at once: the offsets-and-bytes way of Arrow, in numpy alone."""
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -10,10 +12,10 @@ FEW_LENGTHS = 48
 BLOCK = 1 << 22
 
 
-def window(buffer: Bytes, dtype: "np.dtype[np.generic]", writeable: bool = False) -> NDArray[np.generic]:
+def window(buffer: Bytes, dtype: "np.dtype[Any]", writeable: bool = False) -> NDArray[Any]:
     """``buffer`` as an array with an element beginning at *every* byte, so that offsets are indices."""
     count = max(0, len(buffer) - dtype.itemsize + 1)
-    view: NDArray[np.generic] = np.ndarray((count,), dtype, buffer, 0, (1,))
+    view: NDArray[Any] = np.ndarray((count,), dtype, buffer, 0, (1,))
     view.flags.writeable = writeable
     return view
 

@@ -1,7 +1,7 @@
 """`write`: columns to a new MCAP file."""
 
 import os
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -63,11 +63,16 @@ def compression_name(compression: str) -> str:
     return COMPRESSIONS[compression]
 
 
-def add_channels(writer: ChunkWriter, columns: Sequence[Columns], first_id: int = 1, first_schema: int = 1) -> None:
-    """Write the channels' messages as chunks; ids count on from the given ones, schemas the file has are used again."""
+def add_channels(
+    writer: ChunkWriter,
+    columns: Sequence[Columns],
+    channel_ids: Collection[int] = (),
+    schema_ids: Collection[int] = (),
+) -> None:
+    """Write the channels' messages as chunks, under other ids than the given ones; equal schemas are used again."""
     check(columns)
-    outlets = _outlets(columns, writer.contents, first_id, first_schema)
-    write_idle(writer.sink, outlets, set(writer.contents.schemas))
+    outlets = _outlets(columns, writer.contents, free_ids(channel_ids), free_ids(schema_ids))
+    write_idle(writer.sink, outlets)
     writer.write(outlets, schedule([outlet.rows for outlet in outlets]))
 
 
@@ -85,10 +90,10 @@ def check(columns: Sequence[Columns]) -> None:
             )
 
 
-def _outlets(columns: Sequence[Columns], contents: Contents, first_id: int, first_schema: int) -> list[Outlet]:
+def _outlets(
+    columns: Sequence[Columns], contents: Contents, ids: Iterator[int], schema_ids: Iterator[int]
+) -> list[Outlet]:
     known = {(s.name, s.encoding, s.data): s for s in contents.schemas.values()}
-    ids = free_ids(set(contents.channels), first_id)
-    schema_ids = free_ids(set(contents.schemas), first_schema)
     outlets = []
     for entry in columns:
         message = entry.channel.type
@@ -106,8 +111,9 @@ def channel_metadata(channel: Channel) -> dict[str, str]:
     return {QOS_KEY: QOS, **channel.metadata}
 
 
-def free_ids(taken: set[int], first: int) -> Iterator[int]:
-    """Ids from ``first`` up, then the lowest free ones; StorageError when all 65,535 are used."""
+def free_ids(taken: Collection[int]) -> Iterator[int]:
+    """Ids above all that are taken, then the lowest free ones; StorageError when all 65,535 are used."""
+    first = max(taken, default=0) + 1
     for number in [*range(first, 65536), *range(1, first)]:
         if number not in taken:
             yield number
