@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..ingest import simulation
 from .text import seconds
 
 
@@ -36,6 +35,8 @@ def simulate(scenario: str, output: str | Path, *, seed: int = 0, force: bool = 
     The same scenario and seed give the same file. UsageError for an unknown scenario or suffix, StorageError where the
     output exists (without ``force``) or cannot be written.
     """
+    from ..ingest import simulation  # imports scipy.signal, which no other verb waits for
+
     run = simulation.simulate(scenario, seed)
     target = Path(output)
     target.parent.mkdir(parents=True, exist_ok=True)
