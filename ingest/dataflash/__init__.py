@@ -10,7 +10,10 @@ __all__ = ["FORMATS", "read", "recognizes"]
 
 FORMATS = ("dataflash", "dataflash-text")
 
-_BINARY_FMT = b"\xa3\x95\x80"
+_HEADER = b"\xa3\x95"
+_BINARY_FMT = _HEADER + b"\x80"
+_ENOUGH = 8
+"""So many records in a row are no chance."""
 _TEXT_FMT = b"FMT,"
 
 
@@ -18,8 +21,24 @@ def recognizes(head: bytes) -> bool:
     """Whether a file that begins with ``head`` (a few kB) is a DataFlash log, binary or text, however it begins."""
     if head.startswith(_BINARY_FMT) or _is_text(head):
         return True
-    # A log whose beginning is damaged or cut: an FMT record that describes itself or another type consistently.
-    return head.count(_BINARY_FMT) >= 2 or head.count(b"\xa3\x95") >= 16
+    start = head.find(_BINARY_FMT)
+    while start >= 0:
+        if _walks(head, start):
+            return True
+        start = head.find(_BINARY_FMT, start + 1)
+    return head.startswith(_HEADER) and head.count(_HEADER) > _ENOUGH
+
+
+def _walks(head: bytes, at: int) -> bool:
+    """Whether records follow each other from the FMT record at ``at`` on, as they do not in what merely holds some."""
+    lengths = {0x80: 89}
+    count = 0
+    while count < _ENOUGH and head[at : at + 2] == _HEADER and at + 5 <= len(head) and head[at + 2] in lengths:
+        if head[at + 2] == 0x80:
+            lengths[head[at + 3]] = max(head[at + 4], 3)
+        at += lengths[head[at + 2]]
+        count += 1
+    return count == _ENOUGH
 
 
 def _is_text(head: bytes) -> bool:

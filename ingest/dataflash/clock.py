@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...schemas import Segment
-from .clock_kernels import BACKWARD, FORWARD, pieces
+from .clock_kernels import BACKWARD, FORWARD, NO_TIME, pieces
 from .envelope import Line, fit, median_offset
 from .leap_seconds import SECOND_NS, utc_from_gps
 from .log import Log, Records
@@ -36,7 +36,7 @@ class Clock:
 
     ``boot_us`` (n,) is each record's time since boot (a neighbour's where it has none), ``segment`` (n,) its segment,
     ``lines`` the way from boot time to the stamp, one per segment; ``known`` says of each segment whether GPS told its
-    UTC; ``absurd`` counts stamps that could not be true.
+    UTC; ``absurd`` counts stamps that could not be true; ``timed`` is False where no record has any time.
     """
 
     boot_us: Ints
@@ -45,6 +45,7 @@ class Clock:
     segments: tuple[Segment, ...]
     known: tuple[bool, ...]
     absurd: int = 0
+    timed: bool = True
 
     @property
     def utc(self) -> bool:
@@ -88,13 +89,7 @@ def time_column(records: Records) -> tuple[str, int] | None:
 
 def read_clock(log: Log) -> Clock:
     """The log's clock: follow the times since boot, find the segments, and fit each to GPS time."""
-    own = np.full(log.count, -1, np.int64)
-    for records in log.records:
-        column = time_column(records)
-        if column is not None:
-            name, scale = column
-            times = records.data[name]
-            own[records.order] = times if scale == 1 else times.astype(np.int64) * scale
+    own = _own_times(log)
     boot, piece, begins, why, absurd = pieces(own)
     wrapped = _unwrap(boot, begins, log)
     gps_order, gps_utc = gps_times(log)
@@ -111,7 +106,27 @@ def read_clock(log: Log) -> Clock:
         for number, (line, (low, high), reason) in enumerate(zip(lines, spans, reasons, strict=True))
     )
     known = tuple(line is not None for line in fits)
-    return Clock(boot, segment, lines, segments, known, absurd)
+    return Clock(boot, segment, lines, segments, known, absurd, timed=bool(np.any(own != NO_TIME)))
+
+
+def _own_times(log: Log) -> Ints:
+    """Time since boot (n,) of every record, us, NO_TIME where it has none.
+
+    The oldest logs have GPS time and no other: a record's time then lies between its neighbouring fixes'.
+    """
+    own = np.full(log.count, NO_TIME, np.int64)
+    for records in log.records:
+        column = time_column(records)
+        if column is not None:
+            name, scale = column
+            times = records.data[name]
+            own[records.order] = times if scale == 1 else times.astype(np.int64) * scale
+    if np.any(own != NO_TIME):
+        return own
+    order, utc = gps_times(log)
+    if len(order) == 0:
+        return own
+    return np.asarray(np.interp(np.arange(log.count), order, (utc - utc[0]) // 1000), dtype=np.int64)
 
 
 def gps_times(log: Log) -> tuple[Ints, Ints]:

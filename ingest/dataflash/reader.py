@@ -3,6 +3,8 @@
 from collections.abc import Iterator
 from dataclasses import replace
 
+import numpy as np
+
 from ...schemas import Completeness, Finding, Ingested, IngestOptions, InputError, Kind, Severity, Source
 from ...schemas.columns import Columns
 from . import attitudes, binary, passthrough, sensors
@@ -14,7 +16,11 @@ from .parameters import last_values
 
 def ingest(source: Source, options: IngestOptions, *, text: bool) -> Ingested:
     """`attlog.ingest.dataflash.read`; ``options`` have nothing to say here, a log is one vehicle's."""
-    log = _parsed(source, text)
+    with np.errstate(invalid="ignore", over="ignore"):  # damaged values may be signalling NaNs
+        return _ingested(source, _parsed(source, text), text)
+
+
+def _ingested(source: Source, log: Log, text: bool) -> Ingested:
     clock = read_clock(log)
     parameters = last_values(log)
     about = vehicle(log, parameters)
@@ -79,8 +85,11 @@ def _clock_findings(clock: Clock) -> Iterator[Finding]:
         placed = "" if clock.known[segment.index] or not clock.utc else "; no GPS time: its place in time is unknown"
         advice = f"{segment.reason}: estimators start anew here{placed}"
         yield Finding(before.end_ns, segment.start_ns, Severity.WARN, kind, "", step, "s", advice)
+    first = clock.segments[0]
+    if not clock.timed:
+        advice = "no record of this log has a time: all stamps are 0"
+        yield Finding(first.start_ns, first.end_ns, Severity.ERROR, Kind.CLOCK_STEP, "", 0.0, "s", advice)
     if clock.absurd:
-        first = clock.segments[0]
         advice = "records whose time cannot be true have their neighbour's"
         yield Finding(first.start_ns, first.end_ns, Severity.WARN, Kind.CLOCK_STEP, "", clock.absurd, "records", advice)
 

@@ -1,8 +1,8 @@
 """Text DataFlash logs: lines of values, one type a line, to the same structured arrays as a binary log's."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -32,17 +32,27 @@ LONGEST: Final = 256
 ROWS_AT_ONCE: Final = 65_536
 
 
+@dataclass(frozen=True, eq=False)
 class Lines:
-    """The lines of a log that begin with a name, by name, each with its number among all lines."""
+    """The lines of a text log: begin and end of each in ``raw``, and the numbers of those that begin with a name."""
 
-    def __init__(self, raw: Bytes) -> None:
-        self.raw = raw
-        self.begins, self.ends, names = lines(raw)
+    raw: Bytes
+    begins: Ints
+    ends: Ints
+    by_name: Mapping[str, Ints]
+
+    @classmethod
+    def of(cls, raw: Bytes) -> "Lines":
+        """The lines in ``raw`` (uint8, shape (n,))."""
+        begins, ends, names = lines(raw)
         packed, kind, count = np.unique(names, return_inverse=True, return_counts=True)
-        order = np.argsort(kind, kind="stable")
-        groups = np.split(order, np.cumsum(count)[:-1])
-        self.by_name = {_unpacked(name): group for name, group in zip(packed.tolist(), groups, strict=True)}
-        self.unread = {name: len(group) for name, group in self.by_name.items()}
+        groups = np.split(np.argsort(kind, kind="stable"), np.cumsum(count)[:-1])
+        by_name = {_unpacked(name): group for name, group in zip(packed.tolist(), groups, strict=True)}
+        return cls(raw, begins, ends, by_name)
+
+    def named(self, name: str) -> Ints:
+        """Numbers of the lines that begin with ``name``."""
+        return self.by_name.get(name, np.empty(0, np.int64))
 
     def records(self, form: Format, chosen: Ints) -> Records:
         """The lines ``chosen`` as records of a format; a line that does not fit is left out."""
@@ -100,12 +110,12 @@ class Lines:
 
 def parse(data: Bytes) -> Log:
     """Every line of a text log that its FMT lines explain; the others are skipped and counted."""
-    source = Lines(read_only(data))
-    definitions = source.records(FMT, source.by_name.get("FMT", np.empty(0, np.int64)))
+    source = Lines.of(read_only(data))
+    definitions = source.records(FMT, source.named("FMT"))
     found = [definitions]
     numbers = {"FMT": FMT_TYPE}
     for name, versions in _versions(definitions).items():
-        chosen = source.by_name.get(name, np.empty(0, np.int64))
+        chosen = source.named(name)
         numbers[name] = versions[-1][2]
         bounds = [int(np.searchsorted(chosen, line)) for _, line, _ in versions[1:]]
         for (form, _, _), part in zip(versions, np.split(chosen, bounds), strict=True):

@@ -152,6 +152,29 @@ def test_old_logs_in_milliseconds(writer: Any, ingest: Any) -> None:
     assert passed["/dataflash/PARM"].time_ns[0] == start
 
 
+def test_the_oldest_logs_have_gps_time_alone(writer: Any, ingest: Any) -> None:
+    log = writer()
+    log.define(1, "IMU", "ffffff", "GyrX,GyrY,GyrZ,AccX,AccY,AccZ")
+    log.define(2, "GPS", "BIHLLe", "Status,TimeMS,Week,Lat,Lng,Alt")
+    for k in range(51):
+        if k % 10 == 0:
+            log.record("GPS", 3, 100_000_000 + 200 * (k // 10), 1700, 10**8, 10**7, 5000)
+        log.record("IMU", *[0.0] * 6)
+    imu = topics(ingest(log.binary))["/imu0/data_raw"]
+    start = int(utc_from_gps(np.array([1700]), np.array([100_000_000]))[0])
+    assert imu.time_ns[:50] == pytest.approx(start + 20_000_000 * np.arange(50), abs=20_000_000)
+    assert np.all(np.diff(imu.time_ns) >= 0)
+
+
+def test_a_log_without_any_time_says_so(writer: Any, ingest: Any) -> None:
+    log = writer()
+    log.define(1, "IMU", "ffffff", "GyrX,GyrY,GyrZ,AccX,AccY,AccZ")
+    log.record("IMU", *[0.0] * 6)
+    ingested = ingest(log.binary)
+    assert topics(ingested)["/imu0/data_raw"].time_ns.tolist() == [0]
+    assert any("no record of this log has a time" in finding.advice for finding in ingested.findings)
+
+
 def test_a_wrapped_counter_goes_on(writer: Any, ingest: Any) -> None:
     log = writer()
     log.define(1, "IMU", "Iffffff", "TimeMS,GyrX,GyrY,GyrZ,AccX,AccY,AccZ")

@@ -151,6 +151,19 @@ def test_junk_between_records_is_skipped_and_counted(flight: Any, ingest: Any) -
     assert ingested.completeness.dropped.keys() <= {"runs of bad bytes", "records cut short"}
 
 
+@pytest.mark.parametrize("seed", range(15))
+def test_logs_with_noise_between_records_agree_with_pymavlink(
+    flight: Any, ingest: Any, pymavlink_rows: Any, assert_same: Any, seed: int
+) -> None:
+    chance = random.Random(seed)
+    pieces = list(flight(seconds=1.0).pieces)
+    for _ in range(6):
+        noise = chance.randbytes(chance.randrange(1, 900)).replace(b"\xa3", b"\xa2")
+        pieces.insert(chance.randrange(8, len(pieces)), noise)
+    data = b"".join(pieces)
+    assert_same(ingest(data), pymavlink_rows(data))
+
+
 def test_lost_bytes_cost_one_record_not_its_successor(flight: Any, ingest: Any) -> None:
     """pymavlink takes the head of the one and the tail of the other as a record, and loses both."""
     log = flight()
@@ -182,6 +195,7 @@ def test_recognizes(flight: Any) -> None:
     assert dataflash.recognizes(log.binary[:4096])
     assert dataflash.recognizes(log.text[:4096])
     assert dataflash.recognizes(b"junk" + log.binary[:4096])
+    assert not dataflash.recognizes(b"\xfe" + b"".join(piece + b"\xfe\x01" for piece in log.pieces))
     assert not dataflash.recognizes(random.Random(3).randbytes(65536))
     assert not dataflash.recognizes(b"timestamp,x,y,FMT,\n1,2,3,4\n")
     assert not dataflash.recognizes(b"")
@@ -250,3 +264,28 @@ def test_no_bytes_whatever_crash_it(noise: bytes, kind: int) -> None:
         assert (
             ingested.completeness.bytes_read + ingested.completeness.bytes_skipped == ingested.completeness.bytes_total
         )
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seed", range(400))
+def test_heavy_damage_leaves_most_of_a_log(flight: Any, ingest: Any, seed: int) -> None:
+    """Blocks lost, doubled and overwritten, and flipped bits, all at once."""
+    chance = random.Random(seed)
+    data = bytearray(flight(seconds=8.0).binary)
+    definitions = 89 * 6
+    for _ in range(20):
+        at, size = chance.randrange(definitions, len(data) - 600), chance.randrange(1, 600)
+        harm = chance.randrange(4)
+        if harm == 0:
+            del data[at : at + size]
+        elif harm == 1:
+            data[at:at] = data[at - min(at, size) : at]
+        elif harm == 2:
+            data[at : at + size] = chance.randbytes(size)
+        else:
+            data[at] ^= 1 << chance.randrange(8)
+    ingested = ingest(bytes(data))
+    completeness = ingested.completeness
+    assert completeness.bytes_read + completeness.bytes_skipped == len(data)
+    assert completeness.messages > 200
+    assert len(ingested.segments) <= 3
