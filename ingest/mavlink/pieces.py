@@ -1,0 +1,254 @@
+"""The pieces of every sender's clock, with the line from its own times to UTC in each.
+
+UTC comes from SYSTEM_TIME or from own times that count from 1970; else from what another piece or the main vehicle
+tells about the log's stamps; else from those stamps, where they are UTC; else times count from the vehicle's boot.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from . import clocks
+from .clocks import REBOOT, START, STEP, WRAP, Break, Line, Observations
+from .frames import Frames, Group
+from .rows import BOOT_MS, UNIX_US, WRAP_US
+from .scan import Ints
+
+# Messages without time_boot_ms whose time is that of sending; others (a GPS fix) may be old.
+PROMPT: Final = frozenset({"RAW_IMU", "HIGHRES_IMU"})
+UTC_FROM_US: Final = 946_684_800_000_000
+UTC_TO_US: Final = 4_102_444_800_000_000
+AFTER_US: Final = 1_000_000
+MOST_PIECES: Final = 8
+
+SYSTEM_TIME: Final = "SYSTEM_TIME"
+OWN: Final = "own time"
+STAMPS: Final = "log stamps"
+BOOT: Final = "since boot"
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A stretch of a clock from frame ``first`` on. Own times count from boot, modulo the wrap, or from 1970.
+
+    ``arrival`` leads from own time to stamp (None in raw streams), ``utc`` from own time to UTC (us); ``own_first`` is
+    the first own time, ``own_min`` and ``own_max`` bound them.
+    """
+
+    first: int
+    reason: str
+    own_first: int
+    own_min: int
+    own_max: int
+    arrival: Line | None
+    utc: Line | None
+    source: str
+
+    @property
+    def start_us(self) -> int:
+        """UTC of the earliest own time."""
+        assert self.utc is not None
+        return self.utc.at(self.own_min)
+
+    @property
+    def end_us(self) -> int:
+        """UTC of the latest own time."""
+        assert self.utc is not None
+        return self.utc.at(self.own_max)
+
+
+@dataclass(frozen=True)
+class Clock:
+    """The clock of one component; ``unix`` where its times count from 1970."""
+
+    system: int
+    component: int
+    unix: bool
+    seen: int
+    pieces: tuple[Piece, ...]
+
+
+def build(frames: Frames, main: tuple[int, int] | None) -> list[Clock]:
+    """All clocks of a log, resolved; the first is that of ``main`` (system, component), or the one seen most."""
+    clocks_ = [_clock(frames, sender, seen) for sender, seen in _observations(frames)]
+    clocks_ = [c for c in clocks_ if c.pieces]
+    clocks_.sort(key=lambda c: ((c.system, c.component) != main, c.unix, -c.seen))
+    return _resolved(frames, clocks_)
+
+
+def prompt(group: Group) -> bool:
+    """Whether the message's own time is that of its sending."""
+    return group.definition.own_time[0] == BOOT_MS or group.name in PROMPT
+
+
+def _observations(frames: Frames) -> list[tuple[tuple[int, int, bool], Observations]]:
+    """Per sender and kind of time its prompt messages' own times; all its own times where it has no prompt message."""
+    timed = [g.definition.own_time[0] > 0 for g in frames.groups]
+    with_prompt = {(g.system, g.component) for g in frames.groups if prompt(g)}
+    use = [
+        t and (prompt(g) or (g.system, g.component) not in with_prompt)
+        for t, g in zip(timed, frames.groups, strict=True)
+    ]
+    sender = np.array(
+        [g.system << 9 | g.component << 1 if u else -1 for u, g in zip(use, frames.groups, strict=True)], np.int32
+    )
+    key = sender[frames.groups_of]
+    index = np.flatnonzero((key >= 0) & (frames.own_us >= 0))
+    if len(index) == 0:
+        return []
+    kind = (key[index] | (frames.own_us[index] >= UNIX_US)).astype(np.int32)
+    if kind.min() != kind.max():
+        order = np.argsort(kind, kind="stable")
+        index, kind = index[order], kind[order]
+    firsts = np.flatnonzero(np.diff(kind, prepend=-1))
+    result = []
+    for start, part in zip(firsts, np.split(index, firsts[1:]), strict=True):
+        number = int(kind[start])
+        seen = Observations(part, frames.stamps_us[part], frames.own_us[part])
+        result.append(((number >> 9, number >> 1 & 0xFF, bool(number & 1)), seen))
+    return result
+
+
+def _clock(frames: Frames, sender: tuple[int, int, bool], raw: Observations) -> Clock:
+    system, component, unix = sender
+    seen, wraps = (raw, np.zeros(len(raw), np.int64)) if unix else clocks.unwrap(raw, frames.stamped)
+    pair_frames, pair_own, pair_utc = (np.empty(0, np.int64),) * 3 if unix else _pairs(frames, system, component)
+    pair_own = pair_own + WRAP_US * wraps[np.clip(np.searchsorted(seen.frame, pair_frames), 0, len(seen) - 1)]
+    found = clocks.breaks(seen, wraps, frames.stamped)
+    if len(found) > max(MOST_PIECES, len(seen) // 4):  # what starts anew with every other message is no clock
+        return Clock(system, component, unix, 0, ())
+    for at in clocks.utc_steps(pair_own, pair_utc):
+        place = int(np.searchsorted(seen.frame, pair_frames[at]))
+        if all(abs(place - b.at) > 20 for b in found) and 0 < place < len(seen):
+            found.append(Break(place, STEP, sets_utc=True))
+    found.sort(key=lambda b: b.at)
+    stamp_edges = [b.at for b in found if b.reason in (REBOOT, STEP) and not b.sets_utc]
+    utc_edges = [b.at for b in found if b.reason == REBOOT or b.sets_utc]
+    pieces = []
+    for start, stop, reason in _stretches(found, len(seen)):
+        low, high = _around(stamp_edges, start, len(seen))
+        arrival = clocks.envelope(seen.part(low, high)) if frames.stamped else None
+        low, high = _around(utc_edges, start, len(seen))
+        inside = (pair_frames >= seen.frame[low]) & (pair_frames <= seen.frame[high - 1])
+        utc, source = None, ""
+        if unix:
+            utc, source = Line(0, 0), OWN
+        elif inside.any():
+            utc, source = clocks.fit_pairs(pair_own[inside], pair_utc[inside]), SYSTEM_TIME
+        pieces.append(_piece(seen, start, stop, reason, int(wraps[start]) * WRAP_US, arrival, utc, source))
+    return Clock(system, component, unix, len(seen), tuple(pieces))
+
+
+def _stretches(found: list[Break], size: int) -> list[tuple[int, int, str]]:
+    starts = [0, *(b.at for b in found)]
+    return list(zip(starts, [*starts[1:], size], [START, *(b.reason for b in found)], strict=True))
+
+
+def _around(edges: list[int], at: int, size: int) -> tuple[int, int]:
+    """The stretch between ``edges`` that holds observation ``at``."""
+    return max([0, *(e for e in edges if e <= at)]), min([size, *(e for e in edges if e > at)])
+
+
+def _piece(
+    seen: Observations,
+    start: int,
+    stop: int,
+    reason: str,
+    ahead: int,
+    arrival: Line | None,
+    utc: Line | None,
+    source: str,
+) -> Piece:
+    """``ahead``: what the unwrapped own times are ahead of those in the messages."""
+    own = seen.own[start:stop] - ahead
+    arrival, utc = (line and replace(line, of0=line.of0 - ahead) for line in (arrival, utc))
+    return Piece(int(seen.frame[start]), reason, int(own[0]), int(own.min()), int(own.max()), arrival, utc, source)
+
+
+def _pairs(frames: Frames, system: int, component: int) -> tuple[Ints, Ints, Ints]:
+    """Frame, own time and UTC of the sender's SYSTEM_TIME messages that know UTC."""
+    for number, group in enumerate(frames.groups):
+        if (group.name, group.system, group.component) == ("SYSTEM_TIME", system, component):
+            utc = group.rows["time_unix_usec"]
+            knows = (utc >= UTC_FROM_US) & (utc < UTC_TO_US) & (group.rows["time_boot_ms"] > 0)
+            own = group.rows["time_boot_ms"].astype(np.int64) * 1000
+            return np.flatnonzero(frames.groups_of == number)[knows], own[knows], utc[knows].astype(np.int64)
+    return (np.empty(0, np.int64),) * 3
+
+
+@dataclass(frozen=True)
+class _Known:
+    """What the log's stamps lack to UTC, near a stamp."""
+
+    system: int
+    stamp: int
+    lacks: int
+
+
+def _resolved(frames: Frames, clocks_: list[Clock]) -> list[Clock]:
+    known: list[_Known] = []
+    for clock in clocks_:
+        known += [_known(clock, p) for p in clock.pieces if p.utc is not None and p.arrival is not None]
+    done: list[Clock] = []
+    for clock in clocks_:
+        near = _of_system(known, clock.system) or _of_system(known, clocks_[0].system) or known
+        pieces: list[Piece] = []
+        for piece in clock.pieces:
+            filled = piece if piece.utc is not None else _with_utc(frames, piece, near, done)
+            pieces.append(_after(pieces[-1], filled) if pieces else filled)
+        if clock is clocks_[0] and not known:
+            known += [_known(clock, p) for p in pieces if p.arrival is not None]
+        done.append(replace(clock, pieces=tuple(pieces)))
+    return done
+
+
+def _of_system(known: list[_Known], system: int) -> list[_Known]:
+    return [k for k in known if k.system == system]
+
+
+def _known(clock: Clock, piece: Piece) -> _Known:
+    assert piece.arrival is not None
+    assert piece.utc is not None
+    stamp = piece.arrival.at(piece.own_first)
+    return _Known(clock.system, stamp, piece.utc.at(piece.own_first) - stamp)
+
+
+def _with_utc(frames: Frames, piece: Piece, near: list[_Known], done: list[Clock]) -> Piece:
+    if piece.arrival is None:
+        return replace(piece, utc=_beside(piece, done), source=BOOT)
+    stamp = piece.arrival.at(piece.own_first)
+    rate = piece.arrival.rate if abs(piece.arrival.rate - 1) <= clocks.LARGEST_DRIFT else 1.0
+    if near:
+        lacks = min(near, key=lambda k: abs(k.stamp - stamp)).lacks
+        return replace(piece, utc=Line(piece.own_first, stamp + lacks, rate), source=STAMPS)
+    if are_utc(frames):
+        return replace(piece, utc=Line(piece.own_first, stamp, rate), source=STAMPS)
+    return replace(piece, utc=Line(0, 0), source=BOOT)
+
+
+def _beside(piece: Piece, done: list[Clock]) -> Line:
+    """In a raw stream: since boot for the main clock, for another so that it starts at the main clock's time there."""
+    if not done or not done[0].pieces:
+        return Line(0, 0)
+    main = [p for p in done[0].pieces if p.first <= piece.first] or [done[0].pieces[0]]
+    return Line(piece.own_first, main[-1].start_us)
+
+
+def _after(before: Piece, piece: Piece) -> Piece:
+    """The piece, moved where it would begin before its predecessor's end: time never runs backward."""
+    assert before.utc is not None
+    assert piece.utc is not None
+    if piece.start_us > before.end_us:
+        return piece
+    ahead = WRAP_US if piece.reason == WRAP else 0
+    if piece.reason in (STEP, WRAP) and piece.own_min + ahead > before.own_max:
+        return replace(piece, utc=replace(before.utc, of0=before.utc.of0 - ahead), source=before.source)
+    late = before.end_us + AFTER_US - piece.start_us
+    return replace(piece, utc=replace(piece.utc, to0=piece.utc.to0 + late))
+
+
+def are_utc(frames: Frames) -> bool:
+    """Whether the log's stamps count from 1970."""
+    middle = int(np.median(frames.stamps_us)) if len(frames) else 0
+    return frames.stamped and UTC_FROM_US <= middle < UTC_TO_US
