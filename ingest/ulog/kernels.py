@@ -22,7 +22,7 @@ SYNC_MAGIC: Final = np.frombuffer(b"\x2f\x73\x13\x20\x25\x0c\xbb\x12", np.uint8)
 LEAST: Final = np.zeros(256, np.int64)
 """Letter -> the least size of such a message; 0 where there is no such letter."""
 MOST: Final = np.full(256, 0xFFFF, np.int64)
-for _letter, _least in zip("ADFIMPQRSOLCB", (4, 2, 4, 5, 6, 5, 6, 2, 8, 2, 9, 11, 40), strict=True):
+for _letter, _least in zip("ADFIMPQRSOLCB", (4, 2, 2, 5, 6, 5, 6, 2, 8, 2, 9, 11, 40), strict=True):
     LEAST[ord(_letter)] = _least
 for _letter, _most in (("R", 2), ("S", 8), ("O", 2)):
     MOST[ord(_letter)] = _most
@@ -56,6 +56,14 @@ def _subject(data: Bytes, at: int) -> int:
 
 
 @kernel
+def _is_text(data: Bytes, start: int, stop: int) -> bool:
+    at = start
+    while at < stop and (data[at] >= 32 or 9 <= data[at] <= 13 or data[at] == ESCAPE):
+        at += 1
+    return at == stop
+
+
+@kernel
 def _plausible(data: Bytes, at: int, stop: int) -> int:
     """Length of the message at ``at`` by its header alone; 0 where that cannot be one."""
     if at + HEADER > stop:
@@ -84,7 +92,8 @@ def _right(data: Bytes, at: int, stop: int, topics: NDArray[np.int32]) -> int:
                 return 0
     elif KEY_AT[letter] > 0:
         key = int(data[at + KEY_AT[letter]])
-        if key < SHORTEST_KEY or KEY_AT[letter] + 1 + key > length:
+        begin = at + KEY_AT[letter] + 1
+        if key < SHORTEST_KEY or begin + key > at + length or not _is_text(data, begin, begin + key):
             return 0
     return length
 
@@ -119,10 +128,8 @@ def _stands_alone(data: Bytes, at: int, length: int) -> bool:
     key_at = KEY_AT[letter]
     if letter in (PARAMETER, DEFAULT):
         return bool(key_at + 1 + int(data[at + key_at]) + PARAMETER_BYTES == length)
-    for i in range(at + (key_at + 1 if key_at > 0 else TEXT_AT[letter]), at + length):
-        if data[i] < 32 and not 9 <= data[i] <= 13 and data[i] != ESCAPE:
-            return False
-    return bool(letter != FLAGS)
+    begin = at + (key_at + 1 if key_at > 0 else TEXT_AT[letter])
+    return bool(letter != FLAGS and _is_text(data, begin, at + length))
 
 
 @kernel
@@ -143,8 +150,7 @@ def walk(
             return at, count, DAMAGED
         letter = data[at + 2]
         end = at + length
-        credible = _certain(letter) or _leads_on(data, end, stop, 1) or _cut(data, end, stop)
-        if not credible and not _stands_alone(data, at, length):
+        if not (_certain(letter) or _stands_alone(data, at, length) or _leads_on(data, end, stop, 2)):
             return at, count, DAMAGED
         places[count] = at
         slots[count] = topics[_subject(data, at), 2] if letter == DATA else -1
@@ -159,8 +165,8 @@ def walk(
 def resume(data: Bytes, at: int, stop: int, topics: NDArray[np.int32]) -> tuple[int, int]:
     """Where to go on after ``at``, where no message is, and why what is between is skipped.
 
-    A whole message that means nothing here is passed when others follow it; else the next certain message, or the next
-    of three in a row.
+    A whole message that means nothing here is passed when others follow it; else the next message is sought that
+    cannot be chance, by itself or by the two behind it.
     """
     if at + HEADER <= stop and _size(data, at) > 0:
         end = at + HEADER + _size(data, at)
@@ -174,7 +180,9 @@ def resume(data: Bytes, at: int, stop: int, topics: NDArray[np.int32]) -> tuple[
                 return end, BAD_BYTES
     for place in range(at + 1, stop - HEADER):
         length = _right(data, place, stop, topics)
-        if length > 0 and (_certain(data[place + 2]) or _leads_on(data, place + length, stop, 2)):
+        if length > 0 and _certain(data[place + 2]):
+            return place, BAD_BYTES
+        if length > 0 and _stands_alone(data, place, length) and _leads_on(data, place + length, stop, 2):
             return place, BAD_BYTES
     return stop, (TORN if at + HEADER > stop or _cut(data, at, stop) else BAD_BYTES)
 

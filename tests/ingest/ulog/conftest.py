@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+
 from attlog.ingest import ulog
 from attlog.schemas import Columns, Ingested, Source
 from attlog.schemas.passthrough import source_names

@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+
 from attlog.geometry.quaternions import angle_rad, conjugate, multiply
 from attlog.schemas import Kind, Severity
 from attlog.schemas.unified import quaternions, vectors
