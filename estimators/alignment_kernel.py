@@ -3,7 +3,7 @@
 import numpy as np
 
 from ..geometry.jit import kernel
-from ..geometry.kernels import Vector, multiply, renormalize, rotate
+from ..geometry.kernels import Vector, advance, renormalize, rotate
 from .gyro_kernel import interval_turn
 from .loop_kernel import Floats, Times
 
@@ -24,7 +24,7 @@ def unturned(
     for k in range(n):
         u = (rate[k, 0] - bias[0], rate[k, 1] - bias[1], rate[k, 2] - bias[2])
         if k > 0:
-            q = renormalize(multiply(q, interval_turn(before, u, (time_ns[k] - time_ns[k - 1]) * 1e-9, 0.0)))
+            q = advance(renormalize(q), *interval_turn(before, u, (time_ns[k] - time_ns[k - 1]) * 1e-9, 0.0))
         before = u
         forces[k, 0], forces[k, 1], forces[k, 2] = rotate(q, (force[k, 0], force[k, 1], force[k, 2]))
         while row < count and (mag_time_ns[row] <= time_ns[k] or k == n - 1):

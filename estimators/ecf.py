@@ -77,8 +77,8 @@ def run(recording: Recording, parameters: Parameters) -> Estimate:
             m0,
             parameters.heading_only,
         )
-        strength = math.hypot(*start.field) if start.field else 0.0
-        return constants, (start.orientation, start.bias, 0.0, strength, float(math.isnan(start.bias_sigma)))
+        per_usual = 1.0 / math.hypot(*start.field) if start.field else 0.0
+        return constants, (start.orientation, start.bias, 0.0, per_usual, float(math.isnan(start.bias_sigma)))
 
     each_run(inputs, ecf_kernel.run, begin, output, mag=True)
     return result("ecf", inputs, dict(zip(("orientation", "angular_velocity", "gyro_bias"), output, strict=True)))

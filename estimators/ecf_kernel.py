@@ -1,5 +1,6 @@
 """The explicit complementary filter's step; `attlog.estimators.ecf` says the equations and their source."""
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -9,10 +10,9 @@ from ..geometry.jit import kernel, part
 from ..geometry.kernels import (
     Quaternion,
     Vector,
+    advance,
     cross,
-    exponential,
     matrix,
-    multiply,
     norm,
     renormalize,
     turned,
@@ -22,7 +22,7 @@ from ..schemas.estimate import Status
 from .loop_kernel import Floats, Span, Times, march
 
 State = tuple[Quaternion, Vector, float, float, float]
-"""Attitude, bias, recent acceleration over the gate squared, usual field strength, what is left of the settling."""
+"""Attitude, bias, recent acceleration over the gate squared, one over the usual field's length (0: not known), what is left of the settling."""
 Output = tuple[Floats, Floats, Floats]
 
 ACCELEROMETER_REJECTED = int(Status.ACCELEROMETER_REJECTED)
@@ -54,44 +54,44 @@ def step(
     c: Constants, state: State, dt: float, rate: Vector, force: Vector, dt_mag: float, field: Vector
 ) -> tuple[State, Vector, int]:
     """Sample k: w_mes from the attitude of k - 1, then R_k = R_k-1 Exp((gyro - b + kp w_mes) dt)."""
-    q, b, motion, usual, settling = state
+    q, b, motion, per_usual, settling = state
     flags = 0
     rotation = matrix(q)
     up = (rotation[6], rotation[7], rotation[8])  # v_hat of gravity: R^T e_z
-    wx = wy = wz = 0.0  # w_mes, times the interval of the sensor that it comes from
-    length = norm(force)
-    if length > 0.0:
-        weight = c.k_acc * dt / length
-        if c.gate > 0.0:
-            x, y, z = force[0] - c.gravity * up[0], force[1] - c.gravity * up[1], force[2] - c.gravity * up[2]
-            motion += min(c.motion_rate * dt, 1.0) * ((x * x + y * y + z * z) * c.gate - motion)
-            weight = c.k_acc * dt / (c.gravity * (1.0 + motion * (1.0 - settling * settling)))
-            if motion > DROWNED:
-                flags |= ACCELEROMETER_REJECTED
-        e = cross(force, up)
-        wx, wy, wz = weight * e[0], weight * e[1], weight * e[2]
+    if c.gate > 0.0:
+        weight = c.k_acc * dt / (c.gravity * (1.0 + motion * (1.0 - settling * settling)))
+        x, y, z = force[0] - c.gravity * up[0], force[1] - c.gravity * up[1], force[2] - c.gravity * up[2]
+        motion += min(c.motion_rate * dt, 1.0) * ((x * x + y * y + z * z) * c.gate - motion)
+        if motion > DROWNED:
+            flags |= ACCELEROMETER_REJECTED
+    else:
+        length = norm(force)
+        weight = c.k_acc * dt / length if length > 0.0 else 0.0
+    e = cross(force, up)
+    wx, wy, wz = weight * e[0], weight * e[1], weight * e[2]  # w_mes, times the interval of the sensor it comes from
     if dt_mag > 0.0:
-        strength = norm(field)
-        if strength > 0.0:
-            odd = (strength / usual - 1.0) if usual > 0.0 else 0.0
-            odd = odd * odd * c.mag_gate
-            usual = usual + min(dt_mag * c.forget, 1.0) * (strength - usual) if usual > 0.0 else strength
-            weight = c.k_mag * dt_mag / (strength * (1.0 + odd))
-            if odd > DROWNED:
-                flags |= MAGNETOMETER_REJECTED
-            if c.heading_only:
-                f = turned(rotation, field)
-                weight = weight * (f[0] * c.m0[1] - f[1] * c.m0[0])
-                e = up
-            else:
-                e = cross(field, turned_back(rotation, c.m0))
-            wx, wy, wz = wx + weight * e[0], wy + weight * e[1], wz + weight * e[2]
+        square = field[0] * field[0] + field[1] * field[1] + field[2] * field[2]
+        if per_usual == 0.0 or c.mag_gate == 0.0:
+            per_usual = 1.0 / math.sqrt(square)
+        share = min(0.5 * (square * per_usual * per_usual - 1.0), 1.0)  # of the length, more than usual
+        odd = share * share * c.mag_gate
+        if odd > DROWNED:
+            flags |= MAGNETOMETER_REJECTED
+        weight = c.k_mag * dt_mag * per_usual / (1.0 + odd)
+        per_usual -= per_usual * share * min(dt_mag * c.forget, 1.0)
+        if c.heading_only:
+            f = turned(rotation, field)
+            weight = weight * (f[0] * c.m0[1] - f[1] * c.m0[0])
+            e = up
+        else:
+            e = cross(field, turned_back(rotation, c.m0))
+        wx, wy, wz = wx + weight * e[0], wy + weight * e[1], wz + weight * e[2]
     u = (rate[0] - b[0], rate[1] - b[1], rate[2] - b[2])
-    turn = exponential(u[0] * dt + c.kp * wx, u[1] * dt + c.kp * wy, u[2] * dt + c.kp * wz)
+    q = advance(renormalize(q), u[0] * dt + c.kp * wx, u[1] * dt + c.kp * wy, u[2] * dt + c.kp * wz)
     ki = c.ki + c.ki_start * settling
     b = (b[0] - ki * wx, b[1] - ki * wy, b[2] - ki * wz)
     settling -= settling * min(c.settle_rate * dt, 1.0)
-    return (multiply(renormalize(q), turn), b, motion, usual, settling), u, flags
+    return (q, b, motion, per_usual, settling), u, flags
 
 
 @part

@@ -10,7 +10,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from ..geometry.jit import part
-from ..geometry.kernels import Matrix, Quaternion, Vector, exponential, matrix, multiply, renormalize, turned
+from ..geometry.kernels import Matrix, Quaternion, Vector, advance, exponential, matrix, multiply, renormalize, turned
 from ..schemas.estimate import Status
 from .gyro_kernel import interval_turn
 
@@ -145,7 +145,7 @@ def step(
         before = rate
     jump = ((rate[0] - before[0]) ** 2 + (rate[1] - before[1]) ** 2 + (rate[2] - before[2]) ** 2) * dt * dt
     old = (before[0] - b[0], before[1] - b[1], before[2] - b[2])
-    q = multiply(renormalize(q), interval_turn(old, u, dt, c.lag))
+    q = advance(renormalize(q), *interval_turn(old, u, dt, c.lag))
     R = matrix(q)
     turning = (rate[0] * rate[0] + rate[1] * rate[1] + rate[2] * rate[2]) * dt
     P = predict(c, P, R, c.rate_error * jump + c.scale_error * turning, dt)

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..geometry.jit import kernel, part
-from ..geometry.kernels import Quaternion, Vector, exponential, multiply, renormalize
+from ..geometry.kernels import Quaternion, Vector, advance, renormalize
 from .loop_kernel import Floats, Span, Times, march
 
 State = tuple[Quaternion, Vector, Vector]
@@ -22,17 +22,17 @@ def step(
     u = (rate[0] - b[0], rate[1] - b[1], rate[2] - b[2])
     if dt == 0.0:
         before = u
-    return (renormalize(multiply(q, interval_turn(before, u, dt, lag))), b, u), u, 0
+    return (advance(renormalize(q), *interval_turn(before, u, dt, lag)), b, u), u, 0
 
 
 @part
-def interval_turn(a: Vector, b: Vector, dt: float, lag: float) -> Quaternion:
-    """The turn over an interval with measured rates a and b at its ends, of a gyro that lags behind by ``lag`` s.
+def interval_turn(a: Vector, b: Vector, dt: float, lag: float) -> Vector:
+    """The rotation vector over an interval from rate a to rate b, measured by a gyro that lags by ``lag`` s.
 
     Mean rate, its slope over the lag, and the coning term dt^2/12 a x b.
     """
     old, new, cone = 0.5 * dt - lag, 0.5 * dt + lag, dt * dt / 12.0
-    return exponential(
+    return (
         old * a[0] + new * b[0] + cone * (a[1] * b[2] - a[2] * b[1]),
         old * a[1] + new * b[1] + cone * (a[2] * b[0] - a[0] * b[2]),
         old * a[2] + new * b[2] + cone * (a[0] * b[1] - a[1] * b[0]),

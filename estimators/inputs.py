@@ -72,12 +72,14 @@ def prepare(recording: Recording, parameters: ImuParameters, *, mag: bool, needs
     findings += mag_findings
     status = np.zeros(len(time_ns), np.uint32)
     intervals = np.diff(time_ns)
+    longest = int(intervals.max(initial=0))
     interval_s = _median_s(intervals)
-    if 2 * int(np.count_nonzero(intervals > LOW_RATE_NS)) > len(intervals):
+    if longest > LOW_RATE_NS and 2 * int(np.count_nonzero(intervals > LOW_RATE_NS)) > len(intervals):
         status |= np.uint32(Status.LOW_RATE)
         findings.append(_low_rate(time_ns, topic, interval_s))
     max_gap_s = max(parameters.max_gap_s, BRIDGED_INTERVALS * interval_s)
-    runs = _runs(recording, time_ns, intervals, max_gap_s)
+    gaps = np.flatnonzero(intervals > max_gap_s * 1e9).tolist() if longest > max_gap_s * 1e9 else []
+    runs = _runs(recording, time_ns, gaps)
     status[[run.first for run in runs]] |= np.uint32(Status.RESTART)
     findings += _gaps(time_ns, runs, topic)
     north, declination_deg = North.ARBITRARY, 0.0
@@ -108,7 +110,7 @@ def _imu(recording: Recording, number: int) -> tuple[Times, Floats, Floats, str,
         time_ns, rate, force = time_ns[good], rate[good], force[good]
     if len(time_ns) == 0:
         raise MissingSensorError(f"{topic} has no usable sample")
-    if np.any(time_ns[1:] < time_ns[:-1]):
+    if not _sorted(time_ns):
         order = np.argsort(time_ns, kind="stable")
         time_ns, rate, force = time_ns[order], rate[order], force[order]
     return time_ns, rate, force, topic, findings
@@ -130,17 +132,20 @@ def _mag(
     if len(field) != len(time_ns):
         raise InputError(f"{topic}: {len(time_ns)} stamps and {len(field)} fields do not match")
     findings: list[Finding] = []
-    square = np.einsum("ij,ij->i", field, field)
-    good = np.isfinite(square) & (square > 0.0)
-    if not good.all():
+    if not (np.isfinite(field.sum()) and np.all(field[:, 0])):
+        good = np.isfinite(field.sum(axis=1)) & field.any(axis=1)
         findings += _skipped(time_ns, good, topic)
         time_ns, field = time_ns[good], field[good]
-    if np.any(time_ns[1:] < time_ns[:-1]):
+    if not _sorted(time_ns):
         order = np.argsort(time_ns, kind="stable")
         time_ns, field = time_ns[order], field[order]
     if len(time_ns) == 0 and needed:
         raise MissingSensorError(f"{topic} has no usable sample")
     return time_ns, field, topic, findings
+
+
+def _sorted(time_ns: Times) -> bool:
+    return len(time_ns) < 2 or int(np.diff(time_ns).min()) >= 0
 
 
 def _vectors(values: Floats, topic: str) -> Floats:
@@ -161,9 +166,8 @@ def _median_s(intervals: NDArray[np.int64]) -> float:
     return float(np.median(intervals[:: max(1, len(intervals) // 4096)])) * 1e-9
 
 
-def _runs(recording: Recording, time_ns: Times, intervals: NDArray[np.int64], max_gap_s: float) -> tuple[Run, ...]:
-    starts = {0: True}
-    starts |= {index + 1: False for index in np.flatnonzero(intervals > max_gap_s * 1e9).tolist()}
+def _runs(recording: Recording, time_ns: Times, gaps: list[int]) -> tuple[Run, ...]:
+    starts = {0: True} | {index + 1: False for index in gaps}
     for segment in recording.segments:
         index = int(np.searchsorted(time_ns, segment.start_ns))
         if index < len(time_ns):

@@ -34,17 +34,38 @@ def conjugate(q: Quaternion) -> Quaternion:
 
 
 @part
-def exponential(x: float, y: float, z: float) -> Quaternion:
-    """The turn by the rotation vector (x, y, z) in rad; exact to rounding for every angle."""
+def half_angle(x: float, y: float, z: float) -> tuple[float, float]:
+    """sin(a / 2) / a and cos(a / 2) of the rotation vector (x, y, z) of angle a rad; exact to rounding."""
     square = 0.25 * (x * x + y * y + z * z)
-    if square < 0.01:  # half an angle of 0.1 rad: the series' next term is below 1e-17
-        half_sinc = 0.5 - square * (1 / 12 - square * (1 / 240 - square * (1 / 10080 - square / 725760)))
-        cosine = 1.0 - square * (0.5 - square * (1 / 24 - square * (1 / 720 - square * (1 / 40320 - square / 3628800))))
-    else:
-        half = math.sqrt(square)
-        half_sinc = 0.5 * math.sin(half) / half
-        cosine = math.cos(half)
-    return (half_sinc * x, half_sinc * y, half_sinc * z, cosine)
+    if square < 1e-4:  # in both series the next term is below 1e-16
+        sine = 0.5 - square * (1 / 12 - square / 240)
+        return sine, 1.0 - square * (0.5 - square * (1 / 24 - square / 720))
+    if square < 0.01:
+        sine = 0.5 - square * (1 / 12 - square * (1 / 240 - square * (1 / 10080 - square / 725760)))
+        cosine = square * (0.5 - square * (1 / 24 - square * (1 / 720 - square * (1 / 40320 - square / 3628800))))
+        return sine, 1.0 - cosine
+    half = math.sqrt(square)
+    return 0.5 * math.sin(half) / half, math.cos(half)
+
+
+@part
+def exponential(x: float, y: float, z: float) -> Quaternion:
+    """The turn by the rotation vector (x, y, z), rad."""
+    sine, cosine = half_angle(x, y, z)
+    return (sine * x, sine * y, sine * z, cosine)
+
+
+@part
+def advance(q: Quaternion, x: float, y: float, z: float) -> Quaternion:
+    """q * Exp(x, y, z), rad, in the order that keeps the chain of operations short."""
+    a, b, c, d = q
+    sine, cosine = half_angle(x, y, z)
+    return (
+        cosine * a + sine * (d * x + (b * z - c * y)),
+        cosine * b + sine * (d * y + (c * x - a * z)),
+        cosine * c + sine * (d * z + (a * y - b * x)),
+        cosine * d - sine * (a * x + (b * y + c * z)),
+    )
 
 
 @part
