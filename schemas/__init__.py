@@ -1,6 +1,7 @@
 """What a channel holds: message types as one definition each, and the types that a log becomes in memory."""
 
 from .columns import Channel, Columns
+from .csv_options import AttitudeColumns, CsvOptions, World
 from .definition import Constant, Field, MessageType
 from .errors import AttlogError, InputError, MissingSensorError, StorageError, UsageError
 from .estimate import Estimate, North, Status
@@ -13,10 +14,12 @@ __all__ = [
     "PROFILES",
     "AttlogError",
     "Attitude",
+    "AttitudeColumns",
     "Channel",
     "Columns",
     "Completeness",
     "Constant",
+    "CsvOptions",
     "Declination",
     "Estimate",
     "Field",
@@ -40,4 +43,5 @@ __all__ = [
     "Status",
     "StorageError",
     "UsageError",
+    "World",
 ]

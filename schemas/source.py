@@ -2,7 +2,7 @@
 
 import dataclasses
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .columns import Columns
+from .csv_options import CsvOptions
 from .errors import InputError
 from .finding import Finding, Note
 from .recording import Segment
@@ -20,11 +21,15 @@ from .sensors import SensorProfile
 
 @dataclass(frozen=True, eq=False)
 class Source:
-    """A log's bytes, read-only, shape (n,) uint8 (a memory map where it is a file), and the name that messages use."""
+    """A log's bytes, read-only, shape (n,) uint8 (a memory map where it is a file), and the name that messages use.
+
+    A data set in a folder has no bytes of its own: ``parts`` are its files, named by their paths in the folder.
+    """
 
     name: str
     data: NDArray[np.uint8]
     path: Path | None = None
+    parts: "tuple[Source, ...]" = ()
 
     @classmethod
     def from_path(cls, path: str | Path) -> "Source":
@@ -40,15 +45,28 @@ class Source:
         except OSError as error:
             raise InputError(f"{place}: cannot be read: {error.strerror or error}") from error
 
+    @classmethod
+    def from_folder(cls, folder: Path, files: Sequence[Path]) -> "Source":
+        """Map the files of a data set; InputError as for `from_path`."""
+        parts = (dataclasses.replace(cls.from_path(f), name=f.relative_to(folder).as_posix()) for f in files)
+        return cls(folder.resolve().name, np.zeros(0, np.uint8), folder, tuple(parts))
+
     @property
     def size(self) -> int:
-        """Bytes."""
-        return len(self.data)
+        """Bytes, of all parts."""
+        return len(self.data) + sum(part.size for part in self.parts)
 
     @cached_property
     def sha256(self) -> str:
-        """Hexadecimal digest of all bytes."""
-        return hashlib.sha256(self.data.data).hexdigest()
+        """Hexadecimal digest of all bytes, of a folder those of its parts one after the other."""
+        digest = hashlib.sha256(self.data.data)
+        for part in self.parts:
+            digest.update(part.data.data)
+        return digest.hexdigest()
+
+
+NOT_LOST = frozenset({"blank line", "comment", "header"})
+"""Reasons of `Completeness.dropped` that are no loss: there was no sample in such a line."""
 
 
 @dataclass(frozen=True)
@@ -64,16 +82,19 @@ class Completeness:
     @property
     def complete(self) -> bool:
         """Whether nothing was skipped."""
-        return self.bytes_skipped == 0 and not any(self.dropped.values())
+        lost = any(count for reason, count in self.dropped.items() if reason not in NOT_LOST)
+        return self.bytes_skipped == 0 and not lost
 
 
 @dataclass(frozen=True)
 class IngestOptions:
-    """What a user may say about a source: the vehicle to put first, the sensor's scales, the MAVLink dialect."""
+    """What a user may say about a source: the vehicle to put first, the sensor's scales, the MAVLink dialect, a CSV's
+    columns."""
 
     vehicle: int | Literal["all"] | None = None
     sensor: SensorProfile | None = None
     dialect: str = "ardupilotmega"
+    csv: CsvOptions = dataclasses.field(default_factory=CsvOptions)
 
 
 @dataclass(frozen=True, eq=False)
