@@ -33,6 +33,8 @@ class Trim(Enum):
     """R_logged = R R(trim)^T (AP_AHRS, rotation_autopilot_body_to_vehicle_body)."""
     SUBTRACTION = "subtraction"
     """The trim was subtracted from roll and pitch (NavEKF getEulerAngles)."""
+    OF_ACTIVE = "of the active filter"
+    """As the filter that was in charge does it: an EKF subtracts, the others rotate."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +46,7 @@ class Kept:
 
 
 ONBOARD: Final = {
-    "ATT": Kept(Trim.ROTATION),
+    "ATT": Kept(Trim.OF_ACTIVE),
     "AHR2": Kept(Trim.ROTATION),
     "DCM": Kept(Trim.ROTATION),
     "XKQ": Kept(Trim.NONE, quaternion=True),
@@ -64,6 +66,11 @@ ONBOARD: Final = {
 
 TRUTH: Final = ("SIM", Kept(Trim.NONE, quaternion=True))
 CORE_COLUMN: Final = "C"
+ACTIVE_COLUMN: Final = "AEKF"
+EKFS: Final = (1, 2, 3)
+"""Values of AEKF that are EKFs; 0 is DCM, 10 the simulator, 11 an external AHRS."""
+ACTIVE_PARAMETERS: Final = ("AHRS_EKF_TYPE", "AHRS_EKF_USE")
+"""What says so in logs without AEKF."""
 
 
 def reference(log: Log, clock: Clock) -> Iterator[Columns]:
@@ -89,8 +96,7 @@ def onboard(log: Log, clock: Clock, findings: list[Finding]) -> Iterator[Columns
             topic = f"/onboard/{source}/attitude"
             metadata: dict[str, str] = {}
             if kept.trim is not Trim.NONE and trim_known:
-                trim = over_time(log, TRIM, records.order)
-                orientation, metadata = _untrimmed(records, kept, orientation, trim)
+                orientation, metadata = _untrimmed(log, records, kept, orientation)
             elif kept.trim is not Trim.NONE:
                 metadata = {"trim": "unknown"}
                 findings.append(_trim_unknown(topic, clock.stamps(records)))
@@ -135,15 +141,28 @@ def _euler_rad(records: Records) -> Floats:
     return np.radians(np.stack([records.scaled(name) for name in EULER], axis=-1))
 
 
-def _untrimmed(records: Records, kept: Kept, orientation: Floats, trim: Floats) -> tuple[Floats, dict[str, str]]:
-    """``trim`` (n, 3) rad is the one in force at each record."""
+def _untrimmed(log: Log, records: Records, kept: Kept, orientation: Floats) -> tuple[Floats, dict[str, str]]:
+    """Attitudes without the trim that was in force at each record, and what to say of it."""
+    trim = over_time(log, TRIM, records.order)
     constant = bool(np.all(trim == trim[0]))
     metadata = {"trim_rad": " ".join(f"{value:.9g}" for value in trim[-1])}
     if not constant:
         metadata["trim_changed"] = "true"
-    if kept.trim is Trim.SUBTRACTION:
-        return orientation_from_rpy_ned(_euler_rad(records) + trim), metadata
-    return remove_trim(orientation, trim[0] if constant else trim), metadata
+    subtracted = _subtracted(log, records, kept)
+    rotated_back = remove_trim(orientation, trim[0] if constant else trim)
+    if not np.any(subtracted):
+        return rotated_back, metadata
+    added_back = orientation_from_rpy_ned(_euler_rad(records) + trim)
+    return np.where(subtracted[:, np.newaxis], added_back, rotated_back), metadata
+
+
+def _subtracted(log: Log, records: Records, kept: Kept) -> NDArray[np.bool_]:
+    """Which records had the trim subtracted from their angles; the others were rotated by it."""
+    if kept.trim is not Trim.OF_ACTIVE:
+        return np.full(len(records), kept.trim is Trim.SUBTRACTION)
+    if records.format.has(ACTIVE_COLUMN):
+        return np.isin(records.data[ACTIVE_COLUMN], EKFS)
+    return np.asarray(np.any(over_time(log, ACTIVE_PARAMETERS, records.order) > 0.0, axis=1))
 
 
 def _trim_unknown(topic: str, stamps: NDArray[np.int64]) -> Finding:

@@ -125,7 +125,7 @@ def attitudes(log: Any) -> None:
 
 
 def test_the_trim_is_taken_out_of_att_and_nkf1(writer: Any, ingest: Any) -> None:
-    """ATT is R R(trim)^T; NKF1 is roll and pitch less the trim; XKQ has no trim in it."""
+    """ATT of DCM is R R(trim)^T; NKF1 is roll and pitch less the trim; XKQ has no trim in it."""
     log = writer()
     attitudes(log)
     log.record("PARM", 1, b"AHRS_TRIM_X", np.radians(2.0))
@@ -168,6 +168,22 @@ def test_without_parameters_the_trim_is_unknown_and_said_to_be(writer: Any, inge
     assert att.channel.metadata["trim"] == "unknown"
     assert angle_deg(quaternions(att.data), 10, 5, 90)[0] < 1e-4
     assert [(f.kind, f.topic) for f in ingested.findings] == [(Kind.TRIM, "/onboard/att/attitude")]
+
+
+@pytest.mark.parametrize(("aekf", "rotated"), [(0, True), (2, False), (3, False), (10, True)])
+def test_att_has_the_trim_as_the_active_filter_puts_it(aekf: int, rotated: bool, writer: Any, ingest: Any) -> None:
+    """An EKF subtracts it from roll and pitch, the others turn by it: at 40 degrees of bank that is not the same."""
+    log = writer()
+    attitudes(log)
+    log.define(5, "ATT", "QfffB", "TimeUS,Roll,Pitch,Yaw,AEKF")
+    for name, value in ((b"AHRS_TRIM_X", 0.0), (b"AHRS_TRIM_Y", np.radians(-7.0)), (b"AHRS_EKF_TYPE", 3.0)):
+        log.record("PARM", 1, name, value)
+    log.record("ATT", 1000, 40.0, 12.0, 90.0, aekf)
+    q = quaternions(unified(ingest(log.binary))["/onboard/att/attitude"].data)
+    assert bool(angle_deg(q, 40, 5, 90)[0] < 1e-4) is not rotated
+    logged, trim = orientation_from_rpy_ned(np.radians([40, 12, 90])), orientation_from_rpy_ned(np.radians([0, -7, 0]))
+    body_turn = multiply(conjugate(orientation_from_rpy_ned([0.0, 0.0, 0.0])), trim)
+    assert bool(np.degrees(angle_rad(multiply(conjugate(multiply(logged, body_turn)), q)))[0] < 1e-4) is rotated
 
 
 @pytest.mark.parametrize("quaternion", [True, False])
