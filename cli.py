@@ -40,6 +40,12 @@ SOURCE = _options(
     click.option("--vehicle", help="System id whose topics get no prefix, or 'all' to prefix every vehicle's."),
     click.option("--sensor", help="Profile of a sensor that logs raw counts, such as mpu9250."),
     click.option("--dialect", default="ardupilotmega", show_default=True, help="MAVLink dialect."),
+    click.option("--columns", metavar="NAME,...", help="CSV: what the columns are, as in t_us,ax_g,ay_g,az_g,gx_dps,…"),
+    click.option("--rate", type=float, metavar="HZ", help="CSV: fixed rate, in place of a column of times."),
+    click.option("--time-unit", type=click.Choice(["s", "ms", "us", "ns"]), help="CSV: unit of the times."),
+    click.option("--profile", metavar="TOML", help="CSV: profile with columns, units, clock, sensor, attitude."),
+    click.option("--strict", is_flag=True, help="CSV: refuse to guess what neither header nor options say."),
+    click.option("--normalize", is_flag=True, help="CSV: take quaternions that are not of unit norm."),
     click.option("--compression", type=click.Choice(["zstd", "lz4", "none"]), default="zstd", show_default=True),
 )
 ESTIMATE = _options(
@@ -92,7 +98,7 @@ def convert(logs: Sequence[str], jobs: int | None, timeout: float, as_json: bool
     """Turn logs of any format into MCAPs."""
     from . import pipeline
 
-    options["vehicle"] = _vehicle(options["vehicle"])
+    options = _with_csv(options) | {"vehicle": _vehicle(options["vehicle"])}
     _show(pipeline.for_each(pipeline.convert, logs, jobs=jobs, timeout_s=timeout, **options), as_json)
 
 
@@ -155,7 +161,7 @@ def run(
     """Convert, estimate and analyze in one go."""
     from . import pipeline
 
-    options["vehicle"] = _vehicle(options["vehicle"])
+    options = _with_csv(options) | {"vehicle": _vehicle(options["vehicle"])}
     options |= {"estimators": list(estimators) or None, "exclude": [_span(text) for text in exclude]}
     _show(pipeline.for_each(pipeline.run, logs, jobs=jobs, timeout_s=timeout, **options), as_json)
 
@@ -233,6 +239,21 @@ def _vehicle(spelled: str | None) -> Any:
     if not spelled.isdigit():
         raise click.UsageError(f"--vehicle takes a system id or 'all', not {spelled!r}")
     return int(spelled)
+
+
+def _with_csv(options: dict[str, Any]) -> dict[str, Any]:
+    """The options with those for a CSV put together as ``csv``."""
+    from .ingest.serial_csv import csv_options
+
+    columns, profile = options.pop("columns"), options.pop("profile")
+    said = {
+        "columns": tuple(name.strip() for name in columns.split(",")) if columns else None,
+        "rate_hz": options.pop("rate"),
+        "time_unit": options.pop("time_unit"),
+        "strict": options.pop("strict") or None,
+        "normalize": options.pop("normalize") or None,
+    }
+    return options | {"csv": csv_options(profile, **said)}
 
 
 def _span(spelled: str) -> tuple[float, float]:

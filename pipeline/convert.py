@@ -8,6 +8,7 @@ from typing import Any, Literal
 from .. import ingest, storage
 from ..schemas import records
 from ..schemas.columns import Columns
+from ..schemas.csv_options import CsvOptions
 from ..schemas.errors import InputError
 from ..schemas.finding import Finding
 from ..schemas.recording import Recording, Segment
@@ -107,17 +108,18 @@ def ingest_options(
     vehicle: int | Literal["all"] | None = None,
     sensor: str | SensorProfile | None = None,
     dialect: str = "ardupilotmega",
+    csv: CsvOptions | None = None,
 ) -> IngestOptions:
     """The options of `convert` and `run` that the ingestors see."""
     named = profile(sensor) if isinstance(sensor, str) else sensor
-    return IngestOptions(vehicle, named, dialect)
+    return IngestOptions(vehicle, named, dialect, csv or CsvOptions())
 
 
 def read_source(path: Path, options: IngestOptions) -> tuple[Source, Ingested]:
     """Recognise and read a log; InputError for an MCAP, which needs no conversion."""
     if is_mcap(path):
         raise InputError(f"{path}: is an MCAP already; estimate, analyze, annotate and info take it as it is")
-    source = Source.from_path(path)
+    source = ingest.source_of(path)
     return source, ingest.read(source, options)
 
 
@@ -166,7 +168,9 @@ def summary(source: Source, ingested: Ingested, output: Path, columns: Iterable[
 
 
 def is_log(path: Path) -> bool:
-    """Whether some ingestor takes the file; how folders are searched."""
+    """Whether some ingestor takes the file, or the folder as a whole; how folders are searched."""
+    if path.is_dir():
+        return ingest.recognize_folder(path) is not None
     try:
         ingest.recognize(head_of(path), path.name)
     except InputError:
@@ -182,6 +186,7 @@ def convert(
     vehicle: int | Literal["all"] | None = None,
     sensor: str | SensorProfile | None = None,
     dialect: str = "ardupilotmega",
+    csv: CsvOptions | None = None,
     compression: str = "zstd",
     force: bool = False,
 ) -> Conversion:
@@ -189,12 +194,13 @@ def convert(
 
     ``output`` is a file, or a folder; without it the MCAP is written beside the log. ``vehicle`` is the system id whose
     topics have no prefix ("all": every vehicle has one); ``sensor`` a profile (name or `SensorProfile`) for a source of
-    raw counts; ``compression`` zstd, lz4 or none. InputError or StorageError where it cannot be done.
+    raw counts; ``csv`` what a table of numbers does not say itself (`ingest.serial_csv.csv_options`); ``compression``
+    zstd, lz4 or none. InputError or StorageError where it cannot be done.
     """
     path = Path(source)
     target = outputs([path], output)[0]
     check_target(target, path, force)
-    log, ingested = read_source(path, ingest_options(vehicle, sensor, dialect))
+    log, ingested = read_source(path, ingest_options(vehicle, sensor, dialect, csv))
     metadata = metadata_records(log, ingested)
     vehicles = ingested_recordings(ingested, metadata)
     viewed = bodies_columns(list(vehicles.values()))

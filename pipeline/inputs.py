@@ -12,8 +12,9 @@ HEAD_BYTES = 65536
 
 
 def expand(sources: Iterable[str | Path], accepts: Callable[[Path], bool]) -> list[Path]:
-    """The files that ``sources`` name: a file is itself, a folder the files in it (at any depth, sorted, hidden ones
-    left out) that ``accepts`` takes, a glob its matches. A name that matches nothing stays, to be reported."""
+    """The logs that ``sources`` name: a file is itself, a folder the files in it (at any depth, sorted, hidden ones
+    left out) that ``accepts`` takes, or the folder itself where it is taken as one log, a glob its matches. A name that
+    matches nothing stays, to be reported."""
     found: dict[Path, None] = {}
     for source in sources:
         for place in _matches(str(source)):
@@ -29,9 +30,22 @@ def _matches(source: str) -> list[Path]:
 
 
 def _members(folder: Path, accepts: Callable[[Path], bool]) -> list[Path]:
-    files = (path for path in sorted(folder.rglob("*")) if path.is_file())
-    visible = (path for path in files if not any(part.startswith(".") for part in path.relative_to(folder).parts))
-    return [path for path in visible if accepts(path)]
+    if accepts(folder):
+        return [folder]
+    found: list[Path] = []
+    for path in _visible(folder):
+        if path.is_dir() and not path.is_symlink():
+            found += _members(path, accepts)
+        elif path.is_file() and accepts(path):
+            found.append(path)
+    return found
+
+
+def _visible(folder: Path) -> list[Path]:
+    try:
+        return sorted(path for path in folder.iterdir() if not path.name.startswith("."))
+    except OSError:
+        return []
 
 
 def head_of(path: Path) -> bytes:

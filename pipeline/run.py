@@ -7,6 +7,7 @@ from typing import Any, Literal
 
 from .. import storage
 from ..schemas.columns import Columns
+from ..schemas.csv_options import CsvOptions
 from ..schemas.errors import InputError
 from ..schemas.finding import Finding
 from ..schemas.recording import Recording
@@ -62,6 +63,7 @@ def run(
     vehicle: int | Literal["all"] | None = None,
     sensor: str | SensorProfile | None = None,
     dialect: str = "ardupilotmega",
+    csv: CsvOptions | None = None,
     compression: str = "zstd",
     force: bool = False,
 ) -> Run:
@@ -77,7 +79,7 @@ def run(
         return _run_on_mcap(path, output, estimators, declination, options, force)
     target = outputs([path], output)[0]
     check_target(target, path, force)
-    log, ingested = read_source(path, ingest_options(vehicle, sensor, dialect))
+    log, ingested = read_source(path, ingest_options(vehicle, sensor, dialect, csv))
     metadata = metadata_records(log, ingested)
     work = _work(path, ingested, metadata, estimators, declination, options)
     columns = [*ingested.columns, *work.columns(), *both([*ingested.findings, *work.findings()], ingested.notes)]

@@ -4,6 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 
+from .sensors import SensorProfile
+
 
 class World(StrEnum):
     """The world and body axes that an attitude in a file is given in."""
@@ -39,7 +41,8 @@ class CsvOptions:
     only passes through); ``names`` gives the file's own names another meaning; ``units`` is by quantity (``accel``,
     ``gyro``, ``mag``, ``angle``). ``rate_hz`` takes the place of a time column. ``strict`` refuses every guess,
     ``normalize`` accepts quaternions that are not of unit norm. ``axes`` are the sensor's: ``flu``, or ``frd`` where z
-    reads -1 g at rest. ``topics`` puts ``imu``, ``mag``, ``attitude`` or ``csv`` on another topic.
+    reads -1 g at rest. ``sensor`` is the one whose raw counts are printed. ``topics`` puts ``imu``, ``mag``,
+    ``attitude`` or ``csv`` on another topic.
     """
 
     columns: tuple[str, ...] = ()
@@ -51,4 +54,5 @@ class CsvOptions:
     normalize: bool = False
     axes: str = "flu"
     attitude: AttitudeColumns = field(default_factory=AttitudeColumns)
+    sensor: SensorProfile | None = None
     topics: Mapping[str, str] = field(default_factory=dict)

@@ -8,8 +8,9 @@ what is recognised.
 import numpy as np
 
 from ...schemas import Ingested, IngestOptions, Source
+from .profile import csv_options
 
-__all__ = ["read", "recognizes"]
+__all__ = ["csv_options", "read", "recognizes"]
 
 
 def recognizes(head: bytes) -> bool:

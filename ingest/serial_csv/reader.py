@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ...schemas.columns import Columns
 from ...schemas.csv_options import CsvOptions
-from ...schemas.errors import InputError, UsageError
+from ...schemas.errors import InputError
 from ...schemas.finding import Finding, Kind, Note, Severity
 from ...schemas.recording import Segment
 from ...schemas.source import NOT_LOST, Completeness, Ingested, IngestOptions, Source
@@ -19,6 +19,7 @@ from .clock import RESET, Stamps, stamps
 from .dialect import Dialect, sniff
 from .layout import Layout, guessed, named, with_guess
 from .lines import COMMENT, REASONS, TEXT, classified
+from .profile import checked
 from .table import Table, parse
 from .text import Bytes, Text, decoded, single_blanks, without_labels, without_monitor_stamps
 from .units import NANOSECONDS
@@ -37,7 +38,7 @@ SPOKEN: Final = 200
 
 def ingest(source: Source, options: IngestOptions) -> Ingested:
     """Read the file; InputError where it is no table, or where columns, units or clock cannot be told."""
-    csv = options.csv
+    csv = checked(options.csv)
     dialect, text = opened(source)
     layout = named(dialect, csv, source.name)
     table = parse(text, dialect, layout.time if layout is not None else 0)
@@ -47,7 +48,9 @@ def ingest(source: Source, options: IngestOptions) -> Ingested:
         layout = guessed(table.columns, dialect.names, csv, source.name)
     table, layout, device, tick = _clocked(table, layout, csv, source.name)
     stamped = stamps(device, tick)
-    rows = Rows(table.columns, stamped.time_ns, table.line, source.name, csv, options.sensor, list(layout.guesses))
+    rows = Rows(
+        table.columns, stamped.time_ns, table.line, source.name, csv, options.sensor or csv.sensor, list(layout.guesses)
+    )
     made = _channels(rows, layout)
     _refuse_guesses(rows, csv)
     if not made or not rows.used:
@@ -91,8 +94,6 @@ def _channels(rows: Rows, layout: Layout) -> list[Columns]:
 def _clocked(table: Table, layout: Layout, csv: CsvOptions, source: str) -> tuple[Table, Layout, Ints, int]:
     """The rows that have a time and do not repeat the one before word for word, and their device time."""
     if csv.rate_hz is not None:
-        if not csv.rate_hz > 0:
-            raise UsageError(f"--rate {csv.rate_hz:g}: a rate is above 0 Hz")
         return table, layout, times.at_rate(table, csv.rate_hz), 1
     if layout.time is None:
         raise InputError(
