@@ -11,12 +11,14 @@ Bytes = NDArray[np.uint8]
 Ints = NDArray[np.int64]
 Floats = NDArray[np.float64]
 
-TAB, NEWLINE, RETURN, SPACE, COMMA, POINT, MINUS, PLUS, ZERO, NINE = 9, 10, 13, 32, 44, 46, 45, 43, 48, 57
+TAB, NEWLINE, RETURN, SPACE, COMMA, POINT, MINUS, PLUS, ZERO, NINE, LOWER_N = 9, 10, 13, 32, 44, 46, 45, 43, 48, 57, 110
 LONGEST_NAME: Final = 7
 """Names are packed into an integer; DataFlash's have four characters at most."""
 
 INTEGER, REAL, HUNDREDTHS, DEGREES, WORDS = range(5)
 """Kinds of column: an integer, a real number, an integer written divided by 1e2 or 1e7, text."""
+SHIFT: Final = (0, 0, 2, 7, 0)
+"""Power of ten that a kind is multiplied by."""
 READ, UNUSUAL, MISSING = range(3)
 """What became of a value: read; for Python to read; not there."""
 
@@ -134,58 +136,75 @@ def _whole(digits: int, power: int) -> tuple[bool, int]:
 
 
 @kernel
+def _trimmed(data: Bytes, first: int, last: int) -> tuple[int, int]:
+    while first < last and _blank(data[first]):
+        first += 1
+    while last > first and _blank(data[last - 1]):
+        last -= 1
+    return first, last
+
+
+@kernel
+def _real(data: Bytes, first: int, last: int) -> tuple[int, float]:
+    """State and value of a real number; unusual is one that digits times a power of ten does not round correctly."""
+    plain, digits, power = _number(data, first, last)
+    if not plain:
+        return (READ, np.nan) if (data[first] | 32) == LOWER_N else (UNUSUAL, 0.0)
+    if abs(digits) > EXACT or power < -22 or power > 22:
+        return UNUSUAL, 0.0
+    if digits == 0 and data[first] == MINUS:
+        return READ, -0.0
+    return READ, float(digits * POWERS[power] if power >= 0 else digits / POWERS[-power])
+
+
+@kernel
+def _integer(data: Bytes, first: int, last: int, shift: int) -> tuple[int, int]:
+    """State and value of a number times 10^shift, to the nearest integer."""
+    plain, digits, power = _number(data, first, last)
+    if not plain:
+        return UNUSUAL, 0
+    fits, whole = _whole(digits, power + shift)
+    return (READ if fits else UNUSUAL), whole
+
+
+@inline_kernel
+def _comma(data: Bytes, at: int, end: int) -> int:
+    """The next comma from ``at`` on, or the end."""
+    while at < end and data[at] != COMMA:
+        at += 1
+    return at
+
+
+@kernel
 def values(data: Bytes, begins: Ints, ends: Ints, kinds: Ints) -> tuple[Ints, Ints, Ints, NDArray[np.uint8]]:
-    """The columns of lines of one type: (n, k) integers (reals as their bits), begin and end of each, and its state."""
+    """The columns of lines of one type: (n, k) integers (reals as their bits), begin and end of each, and its state.
+
+    A text in the last column goes on to the end of the line, commas and all.
+    """
     shape = (begins.size, kinds.size)
     whole = np.zeros(shape, np.int64)
     real = whole.view(np.float64)
     starts, stops = np.zeros(shape, np.int64), np.zeros(shape, np.int64)
     state = np.full(shape, MISSING, np.uint8)
     for row in range(begins.size):
-        at = begins[row]
         end = ends[row]
-        while at < end and data[at] != COMMA:
-            at += 1
+        at = _comma(data, begins[row], end)
         for column in range(kinds.size):
             if at >= end:
                 break
-            at += 1
-            if at < end and data[at] == SPACE:
-                at += 1
-            stop = at
-            while stop < end and data[stop] != COMMA:
-                stop += 1
-            if kinds[column] == WORDS:
-                if column == kinds.size - 1:
-                    stop = end
-                starts[row, column], stops[row, column], state[row, column] = at, stop, READ
-                at = stop
-                continue
-            first, last = at, stop
-            while first < last and _blank(data[first]):
-                first += 1
-            while last > first and _blank(data[last - 1]):
-                last -= 1
-            starts[row, column], stops[row, column], state[row, column] = first, last, UNUSUAL
-            at = stop
-            if first == last:
-                state[row, column] = MISSING
-                continue
-            plain, digits, power = _number(data, first, last)
-            if not plain:
-                if kinds[column] == REAL and (data[first] | 32) == 110:
-                    real[row, column] = np.nan
-                    state[row, column] = READ
-                continue
-            if kinds[column] == REAL:
-                if abs(digits) <= EXACT and -22 <= power <= 22:
-                    value = digits * POWERS[power] if power >= 0 else digits / POWERS[-power]
-                    real[row, column] = -0.0 if digits == 0 and data[first] == MINUS else value
-                    state[row, column] = READ
-                continue
-            shift = 2 if kinds[column] == HUNDREDTHS else 7 if kinds[column] == DEGREES else 0
-            plain, number = _whole(digits, power + shift)
-            if plain:
-                whole[row, column] = number
+            first = at + 1 + (at + 1 < end and data[at + 1] == SPACE)
+            kind = kinds[column]
+            at = end if kind == WORDS and column == kinds.size - 1 else _comma(data, first, end)
+            last = at
+            if kind == WORDS:
                 state[row, column] = READ
+            else:
+                first, last = _trimmed(data, first, last)
+                if first == last:
+                    continue
+                if kind == REAL:
+                    state[row, column], real[row, column] = _real(data, first, last)
+                else:
+                    state[row, column], whole[row, column] = _integer(data, first, last, SHIFT[kind])
+            starts[row, column], stops[row, column] = first, last
     return whole, starts, stops, state
