@@ -16,12 +16,30 @@ FORWARD_US: Final = 120_000_000
 """A dropout lasts 65 s at most."""
 ADVANCES: Final = 4
 """So many topics' steps forward, without a message on the old clock between, make a new clock."""
+LOOK: Final = 7
+"""So many stamps decide whether a leap forward is the clock's or one message's."""
+FARTHEST: Final = 5000
+"""Within so many messages they have to come."""
 BACKWARD, FORWARD = 1, 2
 
 
 @kernel
 def _follows(time: int, latest: int, late: int) -> bool:
     return latest - late <= time <= latest + FORWARD_US
+
+
+@kernel
+def _absurd(own: Ints, i: int, now: int) -> bool:
+    """Whether the stamp of message ``i``, ahead of ``now``, is that message's own error: most others stay behind."""
+    seen = 0
+    behind = 0
+    for j in range(i + 1, min(i + FARTHEST, own.size)):
+        if own[j] > 0 and _follows(own[j], now, LATE_US):
+            seen += 1
+            behind += int(own[j] < own[i] - LATE_US)
+        if seen == LOOK:
+            break
+    return 2 * behind > seen
 
 
 @kernel
@@ -52,7 +70,7 @@ def follow(own: Ints, subject: NDArray[np.int32], subjects: int, start: int) -> 
         time = own[i]
         who = subject[i]
         if time > 0 and time != seen[who]:
-            if _follows(time, now, LATE_US):
+            if _follows(time, now, LATE_US) and (time <= now + LATE_US or not _absurd(own, i, now)):
                 now = max(now, time)
                 last[who] = time
                 grounded[count - 1] += 1

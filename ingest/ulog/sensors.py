@@ -150,7 +150,7 @@ def _combined_mag(topic: Topic, clock: Clock) -> Columns:
     delay = topic.integers(MAG_DELAY)
     stamps = clock.earlier(topic, np.where(delay == INVALID, 0, -delay))
     good = delay != INVALID
-    repeated = {"repeated": str(len(topic) - 1 - int(np.count_nonzero(np.diff(stamps[good]))))}
+    repeated = {"repeated": str(int(np.count_nonzero(np.diff(stamps[good]) == 0)))}
     return _mag(0, topic, stamps[good], topic["magnetometer_ga"][good], repeated)
 
 
@@ -191,7 +191,8 @@ def _fix(n: int, topic: Topic, kind: Position, clock: Clock) -> Columns:
 
 def _body(vectors: NDArray[np.generic]) -> Floats:
     """Body FRD (n, 3) as stored -> body FLU."""
-    return flu_from_frd(vectors[:, :3].astype(np.float64))
+    with np.errstate(invalid="ignore"):  # a damaged value may be a signaling NaN
+        return flu_from_frd(vectors[:, :3].astype(np.float64))
 
 
 def _vectors(topic: Topic) -> NDArray[np.generic]:
