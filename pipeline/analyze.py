@@ -12,8 +12,8 @@ from ..analysis.table import ErrorTable
 from ..schemas.columns import Columns
 from ..schemas.errors import InputError
 from ..schemas.recording import Attitude, Recording
-from .estimate import open_log, read_recordings
 from .inputs import in_place_target, is_mcap
+from .logs import open_log, read_recordings
 from .provenance import software
 from .verbs import Place, verb
 

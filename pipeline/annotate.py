@@ -11,9 +11,9 @@ from typing import Any
 from .. import storage
 from ..schemas.errors import InputError, UsageError
 from ..schemas.finding import Note, Severity
-from .estimate import everything_said, open_log
 from .findings import ANNOTATIONS, PERSON, notes_columns
 from .inputs import in_place_target, is_mcap
+from .logs import everything_said, open_log
 from .text import seconds, table
 from .verbs import Place, verb
 

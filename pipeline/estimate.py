@@ -16,10 +16,10 @@ from ..schemas.unified import estimate_columns
 from .bodies import BODIES, TF, bodies_columns
 from .convert import finding_lines
 from .declination import with_declination
-from .findings import ANNOTATIONS, FINDINGS, both, findings_from, notes_from, replaced
+from .findings import ANNOTATIONS, FINDINGS, both, replaced
 from .inputs import in_place_target, is_mcap
+from .logs import everything_said, open_log, read_recordings
 from .provenance import made_from
-from .recordings import is_recorded, recordings
 from .text import table
 from .verbs import Place, verb
 
@@ -72,36 +72,13 @@ class Estimation:
 
 @dataclass(frozen=True, eq=False)
 class Estimated:
-    """A recording with the estimates just made, under their names."""
+    """A recording that knows the attitudes just estimated, the estimates as channels, and what is told of them."""
 
     recording: Recording
-    estimates: tuple[Estimate, ...]
+    columns: tuple[Columns, ...]
+    made: tuple[Made, ...]
     skipped: Mapping[str, str]
     findings: tuple[Finding, ...]
-
-    def columns(self) -> list[Columns]:
-        """The estimates as channels."""
-        prefix = self.recording.prefix
-        return [
-            estimate_columns(e, prefix=prefix, metadata=made_from(self.recording, e.inputs)) for e in self.estimates
-        ]
-
-    def made(self) -> list[Made]:
-        """What is told of them."""
-        prefix = self.recording.prefix
-        return [
-            Made(
-                e.name,
-                f"{prefix}{e.attitude.topic}",
-                e.estimator,
-                e.inputs,
-                len(e.time_ns),
-                str(e.north),
-                e.declination_deg,
-                e.findings,
-            )
-            for e in self.estimates
-        ]
 
 
 def default_selections(recording: Recording) -> tuple[str, ...]:
@@ -119,23 +96,40 @@ def estimate_recording(
     chosen = [estimators.parse(text) for text in selected or default_selections(recording)]
     _check_names([selection.name for selection in chosen])
     ready, findings = with_declination(recording, declination_deg)
-    estimates: list[Estimate] = []
+    columns: list[Columns] = []
+    made: list[Made] = []
     skipped: dict[str, str] = {}
+    attitudes = dict(recording.estimates)
     for selection in chosen:
         try:
-            estimates.append(estimators.estimate(ready, selection))
+            estimate = estimators.estimate(ready, selection)
         except MissingSensorError as error:
             skipped[selection.name] = str(error)
-    if all(e.north != North.MAGNETIC for e in estimates):
+            continue
+        topic = f"{recording.prefix}{estimate.attitude.topic}"
+        attitudes[estimate.name] = dataclasses.replace(estimate.attitude, topic=topic)
+        made.append(_made(estimate, topic))
+        # An estimate is large: it becomes a channel before the next one is made.
+        about = made_from(recording, estimate.inputs)
+        columns.append(estimate_columns(estimate, prefix=recording.prefix, metadata=about))
+    if all(each.north != North.MAGNETIC for each in made):
         findings = []
-    everything = [*findings, *(finding for e in estimates for finding in e.findings)]
-    known = {**recording.estimates, **{e.name: _placed(e, recording.prefix) for e in estimates}}
-    return Estimated(dataclasses.replace(ready, estimates=known), tuple(estimates), skipped, tuple(everything))
+    everything = (*findings, *(finding for each in made for finding in each.findings))
+    known = dataclasses.replace(ready, estimates=attitudes)
+    return Estimated(known, tuple(columns), tuple(made), skipped, everything)
 
 
-def _placed(estimate: Estimate, prefix: str) -> Any:
-    attitude = estimate.attitude
-    return dataclasses.replace(attitude, topic=f"{prefix}{attitude.topic}") if prefix else attitude
+def _made(estimate: Estimate, topic: str) -> Made:
+    return Made(
+        estimate.name,
+        topic,
+        estimate.estimator,
+        estimate.inputs,
+        len(estimate.time_ns),
+        str(estimate.north),
+        estimate.declination_deg,
+        estimate.findings,
+    )
 
 
 def _check_names(names: Sequence[str]) -> None:
@@ -146,25 +140,6 @@ def _check_names(names: Sequence[str]) -> None:
         )
 
 
-def open_log(path: Path) -> storage.LogFile:
-    """Open an MCAP; InputError tells what to do with a file that is none."""
-    if path.exists() and not path.is_dir() and not is_mcap(path):
-        raise InputError(f"{path}: is no MCAP; `attlog convert {path}` makes one, `attlog run {path}` does everything")
-    return storage.open(path)
-
-
-def read_recordings(log: storage.LogFile) -> dict[str, Recording]:
-    """The vehicles of an MCAP."""
-    columns = log.read([topic for topic in log.topics if is_recorded(topic)])
-    return recordings(columns.values(), log.metadata)
-
-
-def everything_said(log: storage.LogFile) -> tuple[list[Finding], list[Any]]:
-    """The findings and notes of an MCAP."""
-    said = log.read([topic for topic in (FINDINGS, ANNOTATIONS) if topic in log.topics])
-    return findings_from(said.get(FINDINGS)), notes_from(said.get(ANNOTATIONS))
-
-
 def estimate_vehicles(
     path: Path, vehicles: Mapping[str, Recording], selected: Sequence[str] | None, declination_deg: float | None
 ) -> list[Estimated]:
@@ -173,14 +148,14 @@ def estimate_vehicles(
         estimate_recording(recording, selected, declination_deg) if recording.imu else _untouched(recording)
         for recording in vehicles.values()
     ]
-    if not any(each.estimates for each in done):
+    if not any(each.made for each in done):
         reasons = [reason for each in done for reason in each.skipped.values()]
         raise InputError(f"{path}: nothing could be estimated: {'; '.join(reasons) or 'the log has no IMU channel'}")
     return done
 
 
 def _untouched(recording: Recording) -> Estimated:
-    return Estimated(recording, (), {}, ())
+    return Estimated(recording, (), (), {}, ())
 
 
 @verb(is_mcap, in_place=True)
@@ -205,7 +180,7 @@ def estimate(
         findings, notes = everything_said(log)
         start_ns = log.start_ns
     done = estimate_vehicles(path, vehicles, estimators, declination)
-    columns = [channel for each in done for channel in each.columns()]
+    columns = [channel for each in done for channel in each.columns]
     remade = {channel.channel.topic for channel in columns}
     new = [finding for each in done for finding in each.findings]
     columns += both(replaced(findings, new, remade.__contains__), notes)
@@ -216,6 +191,6 @@ def estimate(
 
 def estimation(source: Path, output: Path, done: Sequence[Estimated], start_ns: int) -> Estimation:
     """The result for all vehicles of a log."""
-    made = tuple(m for each in done for m in each.made())
+    made = tuple(made for each in done for made in each.made)
     skipped = {f"{each.recording.prefix}{name}": why for each in done for name, why in each.skipped.items()}
     return Estimation(str(source), str(output), made, skipped, start_ns)

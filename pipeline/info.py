@@ -9,8 +9,8 @@ from .. import storage
 from ..schemas import records
 from ..schemas.recording import Segment
 from .convert import completeness_text, segment_lines
-from .estimate import open_log
 from .inputs import is_mcap
+from .logs import open_log
 from .text import count, moment, seconds, table
 from .verbs import Place, verb
 

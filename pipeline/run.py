@@ -104,7 +104,7 @@ class _Work:
     start_ns: int
 
     def columns(self) -> list[Columns]:
-        estimates = [channel for each in self.estimated for channel in each.columns()]
+        estimates = [channel for each in self.estimated for channel in each.columns]
         errors = [channel for each in self.analyzed for channel in each.columns()]
         return [*estimates, *errors, *bodies_columns(self.recordings)]
 

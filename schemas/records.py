@@ -40,8 +40,8 @@ def completeness_record(completeness: Completeness) -> dict[str, str]:
 def parse_completeness(record: Mapping[str, str]) -> Completeness:
     """The inverse of `completeness_record`."""
     dropped = {key.removeprefix("dropped."): int(value) for key, value in record.items() if key.startswith("dropped.")}
-    counts = (int(record[key]) for key in ("bytes_total", "bytes_read", "messages", "bytes_skipped"))
-    return Completeness(*counts, dropped)
+    counts = {name: int(record[name]) for name in ("bytes_total", "bytes_read", "messages", "bytes_skipped")}
+    return Completeness(**counts, dropped=dropped)
 
 
 def parameters_record(parameters: Mapping[str, float]) -> dict[str, str]:

@@ -14,6 +14,9 @@ from .messages import ATTITUDE, ATTITUDE_ESTIMATE, IMU, MAGNETIC_FIELD, NAV_SAT_
 from .recording import Floats
 
 BODY = "base_link"
+_IMU_FIELDS = ("orientation_covariance", "angular_velocity", "linear_acceleration")
+_IMU_DATA = np.dtype([(name, IMU.dtype()[name]) for name in _IMU_FIELDS])
+_CACHED_BYTES = 1 << 21
 WORLD = "world"
 
 
@@ -41,10 +44,14 @@ def table(message: MessageType, columns: Mapping[str, ArrayLike], lengths: Mappi
     """A structured array of the named fields; (n, k) doubles fill a nested message or an array field."""
     whole = message.dtype(lengths)
     dtype = np.dtype([(name, whole[name]) for name in columns])
-    count = len(np.asarray(next(iter(columns.values()))))
-    result = np.zeros(count, dtype)
-    for name, values in columns.items():
-        result[name] = nested(message, name, values) if dtype[name].names else values
+    filled = {n: nested(message, n, values) if dtype[n].names else np.asarray(values) for n, values in columns.items()}
+    count = len(next(iter(filled.values())))
+    result = np.empty(count, dtype)
+    step = max(1, _CACHED_BYTES // max(1, dtype.itemsize))
+    for start in range(0, count, step):  # rows are wide: all fields of a few, while those are in the cache
+        rows = result[start : start + step]
+        for name, values in filled.items():
+            rows[name] = values[start : start + step]
     return result
 
 
@@ -59,16 +66,11 @@ def imu_columns(
     frame_id: str = BODY,
 ) -> Columns:
     """sensor_msgs/msg/Imu from (n, 3) rad/s and (n, 3) m/s^2, body FLU; ``source`` names the message it came from."""
-    covariance = np.zeros((len(time_ns), 9))
-    covariance[:, 0] = -1.0
-    data = table(
-        IMU,
-        {
-            "orientation_covariance": covariance,
-            "angular_velocity": angular_velocity,
-            "linear_acceleration": specific_force,
-        },
-    )
+    values = np.zeros((len(time_ns), 15))
+    values[:, 0] = -1.0
+    values[:, 9:12] = angular_velocity
+    values[:, 12:] = specific_force
+    data = values.view(_IMU_DATA)[:, 0]
     return Columns(_channel(topic, IMU, source, metadata, frame_id), time_ns, data)
 
 

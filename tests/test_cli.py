@@ -196,7 +196,7 @@ def test_a_missing_sensor_is_skipped_with_a_line(attlog: Attlog, flight: Path) -
 
 def test_real_logs(attlog: Attlog, logs: Path, tmp_path: Path) -> None:
     sitl = attlog("run", logs / "copter_sitl_truth.BIN", "-o", "sitl.mcap", "--start", "5", "--json")
-    assert sitl.returncode == 0, sitl.stderr
+    assert sitl.returncode == 3, sitl.stderr  # its last record is torn
     errors = {row["name"]: row["statistics"] for row in json.loads(sitl.stdout)[0]["errors"]}
     rmse = {name: [errors[name][axis]["rmse"] for axis in ("roll", "pitch", "yaw")] for name in ("ecf", "ekf9")}
     assert all(value < bound for value, bound in zip(rmse["ecf"], (0.8, 2.3, 2.0), strict=True)), rmse
