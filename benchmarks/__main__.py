@@ -3,7 +3,7 @@
 import sys
 from importlib import import_module
 
-NAMES = ("storage", "mavlink", "dataflash", "estimators", "run")
+NAMES = ("storage", "mavlink", "dataflash", "ulog", "estimators", "run")
 
 
 def main(names: list[str]) -> int:
