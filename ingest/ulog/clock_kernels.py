@@ -5,7 +5,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ...geometry.jit import kernel
+from ...geometry.jit import kernel, part
 
 Ints = NDArray[np.int64]
 
@@ -23,12 +23,12 @@ FARTHEST: Final = 5000
 BACKWARD, FORWARD = 1, 2
 
 
-@kernel
+@part
 def _follows(time: int, latest: int, late: int) -> bool:
     return latest - late <= time <= latest + FORWARD_US
 
 
-@kernel
+@part
 def _absurd(own: Ints, i: int, now: int) -> bool:
     """Whether the stamp of message ``i``, ahead of ``now``, is that message's own error: most others stay behind."""
     seen = 0

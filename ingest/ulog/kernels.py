@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ...geometry.jit import inline_kernel, kernel
+from ...geometry.jit import inline_kernel, kernel, part
 
 Bytes = NDArray[np.uint8]
 Ints = NDArray[np.int64]
@@ -55,7 +55,7 @@ def _subject(data: Bytes, at: int) -> int:
     return int(data[at + HEADER]) | (int(data[at + HEADER + 1]) << 8)
 
 
-@kernel
+@part
 def _is_text(data: Bytes, start: int, stop: int) -> bool:
     at = start
     while at < stop and (data[at] >= 32 or 9 <= data[at] <= 13 or data[at] == ESCAPE):
@@ -63,7 +63,7 @@ def _is_text(data: Bytes, start: int, stop: int) -> bool:
     return at == stop
 
 
-@kernel
+@part
 def _plausible(data: Bytes, at: int, stop: int) -> int:
     """Length of the message at ``at`` by its header alone; 0 where that cannot be one."""
     if at + HEADER > stop:
@@ -75,7 +75,7 @@ def _plausible(data: Bytes, at: int, stop: int) -> int:
     return HEADER + size
 
 
-@kernel
+@part
 def _right(data: Bytes, at: int, stop: int, topics: NDArray[np.int32]) -> int:
     """Length of the message at ``at``; 0 where it is not one by all that is known of its kind."""
     length = _plausible(data, at, stop)
@@ -104,7 +104,7 @@ def _certain(letter: int) -> bool:
     return letter in (DATA, SYNC)
 
 
-@kernel
+@part
 def _leads_on(data: Bytes, at: int, stop: int, steps: int) -> bool:
     """Whether so many plausible messages follow, or the section ends behind one."""
     for _ in range(steps):
@@ -115,13 +115,13 @@ def _leads_on(data: Bytes, at: int, stop: int, steps: int) -> bool:
     return True
 
 
-@kernel
+@part
 def _cut(data: Bytes, at: int, stop: int) -> bool:
     """Whether a message begins at ``at`` that ends behind the section's end."""
     return at + HEADER <= stop and 0 < LEAST[data[at + 2]] <= _size(data, at) and at + HEADER + _size(data, at) > stop
 
 
-@kernel
+@part
 def _stands_alone(data: Bytes, at: int, length: int) -> bool:
     """Whether a right message is credible whatever follows: its values fill it exactly, or it is text."""
     letter = data[at + 2]
