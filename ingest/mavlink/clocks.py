@@ -19,6 +19,7 @@ from .scan import Ints
 STEP_US: Final = 1_000_000
 WINDOW_US: Final = 10_000_000
 WINDOW_MOST: Final = 2000
+ENOUGH: Final = 20
 WRAP_SLACK_US: Final = 60_000_000
 BINS: Final = 64
 SPAN_US: Final = 60_000_000
@@ -102,12 +103,18 @@ def _stamped_breaks(seen: Observations) -> list[Break]:
         before = _window(seen.stamp, int(k), start, -1)
         after = _window(seen.stamp, int(k) + 1, len(seen), 1)
         change = offset[after].min() - offset[before].min()
-        if abs(change) <= STEP_US or abs(jump[k]) < 0.5 * abs(change):
+        least = STEP_US if _lasts(seen.stamp[after]) and _lasts(seen.stamp[before]) else WINDOW_US
+        if abs(change) <= least or abs(jump[k]) < 0.5 * abs(change):
             continue
         fell = seen.own[after].min() < seen.own[before].max() - STEP_US
         found.append(Break(int(k) + 1, REBOOT if fell else STEP))
         start = int(k) + 1
     return found
+
+
+def _lasts(stamp: Ints) -> bool:
+    """Whether a window holds enough to tell a step from a link's jitter."""
+    return len(stamp) >= ENOUGH or bool(stamp.max() - stamp.min() > WINDOW_US // 2)
 
 
 def _window(stamp: Ints, at: int, limit: int, way: int) -> slice:

@@ -6,6 +6,7 @@ from typing import Final
 
 import numpy as np
 
+from ...schemas.columns import Table
 from ...schemas.finding import Note, Severity
 from .definitions import Dialect
 from .frames import Frames, Group
@@ -24,6 +25,9 @@ SEVERITIES: Final = (
     Severity.INFO,
     Severity.DEBUG,
 )
+# Until 2015 ArduPilot counted the other way: low, medium, high, critical; its banner, of low severity, tells.
+OLD_SEVERITIES: Final = {1: Severity.INFO, 2: Severity.WARN, 3: Severity.ERROR, 4: Severity.FATAL}
+OLD_BANNERS: Final = (b"GROUND START", b"Initialising APM", b"Calibrating barometer")
 ARMED: Final = 128
 CHUNK: Final = 50
 
@@ -47,7 +51,7 @@ class _Parts:
     """A status text that comes in chunks."""
 
     time_ns: int
-    severity: int
+    severity: Severity
     identity: int
     next_chunk: int
     text: bytes
@@ -56,9 +60,11 @@ class _Parts:
 def _texts(group: Group, line: Timeline, main: int) -> Iterator[Note]:
     rows = with_clean_texts(group)
     name = _name(group, main, "STATUSTEXT")
-    columns = (rows[field].tolist() for field in ("severity", "text", "id", "chunk_seq"))
+    columns = (rows[field].tolist() for field in ("text", "id", "chunk_seq"))
     parts: _Parts | None = None
-    for time_ns, severity, text, identity, chunk in zip(line.of(group).tolist(), *columns, strict=True):
+    for time_ns, severity, text, identity, chunk in zip(
+        line.of(group).tolist(), _severities(rows), *columns, strict=True
+    ):
         if parts is not None and not (identity == parts.identity and chunk == parts.next_chunk):
             yield _note(name, parts.time_ns, parts.severity, parts.text)
             parts = None
@@ -75,8 +81,15 @@ def _texts(group: Group, line: Timeline, main: int) -> Iterator[Note]:
         yield _note(name, parts.time_ns, parts.severity, parts.text)
 
 
-def _note(name: str, time_ns: int, severity: int, text: bytes) -> Note:
-    return Note(time_ns, SEVERITIES[min(severity, len(SEVERITIES) - 1)], name, text.decode("utf-8", "replace"))
+def _severities(rows: Table) -> list[Severity]:
+    levels = rows["severity"].tolist()
+    low = rows["text"][rows["severity"] == 1].tolist()
+    old = OLD_SEVERITIES if any(text.startswith(OLD_BANNERS) for text in low) else {}
+    return [old.get(level) or SEVERITIES[min(level, len(SEVERITIES) - 1)] for level in levels]
+
+
+def _note(name: str, time_ns: int, severity: Severity, text: bytes) -> Note:
+    return Note(time_ns, severity, name, text.decode("utf-8", "replace"))
 
 
 def _states(group: Group, line: Timeline, main: int, dialect: Dialect) -> Iterator[Note]:

@@ -15,6 +15,8 @@ from .scan import HEADER_1, HEADER_2, MAGIC_1, Bytes, Ints
 NO_TIME: Final = -1
 UNIX_US: Final = 1_000_000_000_000_000
 """Times from here on (September 2001) count from 1970, smaller ones from the sender's boot."""
+LATEST_US: Final = 1 << 52
+"""Times from here on (the year 2112) are none."""
 WRAP_US: Final = 4_294_967_296_000
 """time_boot_ms begins anew after so many microseconds (49.7 days); boot times are kept modulo this."""
 BOOT_MS: Final = 1
@@ -81,7 +83,7 @@ def own_time(out: NDArray[np.uint64], at: Integer, how: Integer, near: Integer) 
         own *= 1000
     elif how == SHORT_MICROSECONDS:
         own = extend_short(own, near) if own > 0 and near >= 0 else NO_TIME
-    if own <= 0:
+    if own <= 0 or own > LATEST_US:
         return NO_TIME
     return own if own >= UNIX_US else own % WRAP_US
 

@@ -136,12 +136,12 @@ def is_magic(data: Bytes, at: Integer) -> bool:
 
 @kernel
 def stamp_at(data: Bytes, at: Integer) -> Integer:
-    """The big-endian stamp at ``at`` in microseconds, NO_STAMP where it does not fit 63 bits."""
+    """The big-endian stamp at ``at`` in microseconds, NO_STAMP where it is beyond the year 2112."""
     high, low = np.int64(0), np.int64(0)
     for i in range(4):
         high = high << 8 | np.int64(data[np.uint64(at + i)])
         low = low << 8 | np.int64(data[np.uint64(at + 4 + i)])
-    return NO_STAMP if high >> 31 else high << 32 | low
+    return NO_STAMP if high >> 20 else high << 32 | low
 
 
 @kernel
@@ -151,12 +151,18 @@ def near(stamp: Integer, other: Integer) -> bool:
 
 
 @kernel
-def record_begins(data: Bytes, at: Integer, last: Integer) -> bool:
-    """Whether a stamp within a day of ``last`` and then a header's first byte are at ``at``."""
-    if at + STAMP >= len(data) or not is_magic(data, at + STAMP):
+def stamp_is_credible(data: Bytes, at: Integer, last: Integer) -> bool:
+    """Whether a stamp within a day of ``last`` is at ``at``, and something behind it."""
+    if at + STAMP >= len(data):
         return False
     stamp = stamp_at(data, at)
     return bool(stamp >= 0 and near(stamp, last))
+
+
+@kernel
+def record_begins(data: Bytes, at: Integer, last: Integer) -> bool:
+    """Whether a credible stamp and then a header's first byte are at ``at``."""
+    return bool(is_magic(data, at + STAMP) and stamp_is_credible(data, at, last))
 
 
 @kernel
@@ -249,9 +255,9 @@ def scan(
             continue
         start, found = at, at
         owner: Integer = NO_STAMP
-        if stamped and record_begins(data, at, last):
-            owner, start = stamp_at(data, at), head
-        if start == head:
+        if stamped and stamp_is_credible(data, at, last):
+            owner, start, found = stamp_at(data, at), head, head
+        if start == head and is_magic(data, head):
             found = start + 1
         found, length = next_right(data, found, crc_extra, stamped, last)
         if length > 0:
