@@ -57,6 +57,7 @@ def annotate(
         write_end(sink, job.contents)
         if same and not log.file.is_current():
             raise StorageError(f"{path}: another program changed the file meanwhile; nothing was written, run it again")
+        log.close()  # some systems do not rename over an open file
 
 
 def _same_file(one: Path, other: Path) -> bool:

@@ -1,7 +1,7 @@
 """Chunks back to bytes, and where in them each channel's messages are."""
 
 import struct
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -97,21 +97,23 @@ class ChunkReader:
             ) from error
         return data
 
-    def indexed(self, chunk: ChunkIndex, indexes: memoryview) -> dict[int, Messages]:
-        """Channel id -> messages, from the message indexes behind the chunk; InputError where they contradict it."""
+    def indexed(
+        self, chunk: ChunkIndex, indexes: memoryview, wanted: Container[int] | None = None
+    ) -> dict[int, Messages]:
+        """Wanted channel id -> messages, from the message indexes behind the chunk; InputError where unsound."""
         origin = chunk.offset + chunk.length
         found: dict[int, Messages] = {}
-        at, end = 0, len(indexes)
-        while at < end:
-            op, length, channel, size = _INDEX_HEAD.unpack_from(indexes, at) if end - at >= 15 else (0, 0, 0, 0)
-            if op != Op.MESSAGE_INDEX or size != length - 6 or size % 16 or size > end - at - 15 or channel in found:
-                raise damaged(self.file.path, origin + at, "no sound message index where one is said to be")
-            entries = np.frombuffer(indexes, I8, size // 8, at + 15).reshape(-1, 2).T.copy()
-            found[channel] = Messages(entries[1], entries[0])
-            at += 15 + size
-        if not found.keys() >= chunk.message_indexes.keys():
-            missing = min(chunk.message_indexes.keys() - found.keys())
-            raise damaged(self.file.path, origin, f"no message index of channel {missing} behind its chunk")
+        for number, place in chunk.message_indexes.items():
+            if wanted is not None and number not in wanted:
+                continue
+            at = place - origin
+            whole = 0 <= at <= len(indexes) - _INDEX_HEAD.size
+            op, length, channel, size = _INDEX_HEAD.unpack_from(indexes, at) if whole else (0, 0, 0, 0)
+            sound = op == Op.MESSAGE_INDEX and channel == number and size == length - 6 and size % 16 == 0
+            if not sound or size > len(indexes) - at - _INDEX_HEAD.size:
+                raise damaged(self.file.path, place, f"no sound message index of channel {number} here")
+            entries = np.frombuffer(indexes, I8, size // 8, at + _INDEX_HEAD.size).reshape(-1, 2).T.copy()
+            found[number] = Messages(entries[1], entries[0])
         return found
 
     def scanned(self, records: Records) -> dict[int, Messages]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..schemas.columns import Channel, Columns
 from ..schemas.errors import InputError, UsageError
+from .batches import batched
 from .cdr import PayloadError, watched
 from .channels import ChannelInfo, decoded, type_of
 from .chunks_in import ChunkReader, Messages, Records, definitions, times
@@ -144,8 +145,10 @@ class LogFile:
             if not times(chunk, start_ns, end_ns) or not _holds(chunk, wanted):
                 continue
             records, indexes = reader.load(chunk)
-            found = reader.indexed(chunk, indexes) if chunk.message_indexes else reader.scanned(records)
-            yield records, _wanted(found, wanted)
+            if chunk.message_indexes:
+                yield records, reader.indexed(chunk, indexes, wanted)
+            else:
+                yield records, _wanted(reader.scanned(records), wanted)
         for records in self.loose():
             yield records, _wanted(reader.scanned(records), wanted)
 
@@ -159,7 +162,7 @@ class LogFile:
             expected = min(info.count, possible // MESSAGE_HEAD) if whole else 0
             watch = {"watch": partial(watched, info.channel.type)} if info.encoding == "cdr" and not info.raw else {}
             collectors[info.id] = Collector(self.file, info.id, expected, **watch)
-        for records, found in self.parts(set(collectors), start_ns, end_ns, crc):
+        for records, found in batched(self.parts(set(collectors), start_ns, end_ns, crc), len(collectors)):
             with self._guard(records.offset):
                 for number, messages in found.items():
                     collectors[number].add(records, messages.between(start_ns, end_ns))

@@ -2,6 +2,7 @@
 
 import contextlib
 import os
+import secrets
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -39,7 +40,8 @@ def replacing(path: Path, force: bool) -> Iterator[Sink]:
         raise StorageError(f"{path}: exists already; choose another name, or overwrite it with --force (force=True)")
     if target.is_dir():
         raise StorageError(f"{path}: is a directory; give the name of a file")
-    beside = target.with_name(f".{target.name}.{os.getpid()}.part")
+    beside = target.with_name(f".attlog-{os.getpid()}-{secrets.token_hex(4)}.part")
+    _remove_leftovers(target.parent)
     try:
         with open(beside, "wb") as file:
             yield Sink(file, path)
@@ -58,6 +60,19 @@ def replacing(path: Path, force: bool) -> Iterator[Sink]:
         _remove(beside)
         raise
     _sync_folder(target.parent)
+
+
+def _remove_leftovers(folder: Path) -> None:
+    """Unfinished files of processes that were killed."""
+    if os.name != "posix":
+        return
+    for left in folder.glob(".attlog-*-*.part"):
+        try:
+            os.kill(int(left.name.split("-")[1]), 0)
+        except ProcessLookupError:
+            _remove(left)
+        except (OSError, ValueError, OverflowError):
+            continue  # another user's, or not ours
 
 
 def _remove(path: Path) -> None:

@@ -130,9 +130,8 @@ def _values(kind: str | MessageType) -> st.SearchStrategy[Any]:
     if kind in ("float32", "float64"):
         return st.floats(allow_nan=False, width=int(kind[5:]))
     bits = int("".join(c for c in kind if c.isdigit()) or 8)
-    low, high = RANGES.get(
-        kind, (0, 2**bits - 1) if kind.startswith("u") else (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
-    )
+    signed = (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
+    low, high = RANGES.get(kind, (0, 2**bits - 1) if kind.startswith("u") else signed)
     return st.integers(low, high)
 
 

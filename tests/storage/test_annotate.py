@@ -144,7 +144,7 @@ def test_damage_found_on_the_way_leaves_the_file(log: Path) -> None:
     data = bytearray(log.read_bytes())
     data[chunk.offset + chunk.length // 2] ^= 1
     log.write_bytes(bytes(data))
-    with pytest.raises(InputError, match="CRC|unpack"):
+    with pytest.raises(InputError, match=r"CRC|unpack"):
         storage.annotate(log, remove=lambda topic: topic == "/mag0/field")
     assert log.read_bytes() == bytes(data)
     assert len(list(log.parent.iterdir())) == 1

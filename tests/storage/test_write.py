@@ -140,9 +140,8 @@ def test_foxglove_reads_every_channel(every_type: Any, readcheck: Path, compress
         columns = log.read()
     again = path.with_name("again.mcap")
     storage.write(again, columns.values(), compression=compression)
-    done = subprocess.run(
-        ["node", "readcheck.mjs", str(again)], cwd=readcheck, capture_output=True, text=True, check=False
-    )
+    command = ["node", "readcheck.mjs", str(again)]
+    done = subprocess.run(command, cwd=readcheck, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout[-3000:]
 
 
