@@ -16,19 +16,18 @@ interval. What flight needs beyond (3), and what switches it off:
 * ``gate``: the force enters as f/g, whose mean is right however hard one shakes, and counts 1 / (1 + (a / gate)^2)
   where a is the acceleration of the last ``motion_s``. inf: f/|f|, always.
 * ``mag_gate``: a field whose length is off the usual one by a share x counts 1 / (1 + (x / mag_gate)^2). inf: always.
-* ``ki_start``: where the log does not begin at rest the bias is sought faster, and accelerations are doubted less, for
-  ``settle_s``. 0 with a rest at the start: (2).
+* ``ki_start``, ``start_gain``: where the log does not begin at rest, w_mes and ki are larger, and accelerations doubted
+  less, for about ``settle_s``. Both 0, or a rest at the start: (1) and (2).
 """
 
 import math
 from dataclasses import dataclass
 
-from ..geometry.kernels import Vector
 from ..schemas.estimate import Estimate
 from ..schemas.recording import Recording
-from .alignment import GRAVITY, Start
+from .alignment import GRAVITY, Start, Vector
 from .inputs import prepare
-from .output import block, result
+from .output import empty, result
 from .parameters import MargParameters, choice, quantity
 from .registry import Estimator
 from .runs import each_run
@@ -41,6 +40,7 @@ class Parameters(MargParameters):
     kp: float = quantity(1.0, "1/s", "gain of the attitude, times k_acc and k_mag")
     ki: float = quantity(0.005, "1/s^2", "gain of the bias, times k_acc and k_mag")
     ki_start: float = quantity(0.1, "1/s^2", "added to ki while a bias settles that no rest has shown")
+    start_gain: float = quantity(2.0, "", "added to the factor on w_mes meanwhile, from 1")
     settle_s: float = quantity(30.0, "s", "time constant of that", minimum=1e-3)
     k_acc: float = quantity(0.2, "", "weight of the accelerometer")
     k_mag: float = quantity(0.1, "", "weight of the magnetometer")
@@ -58,7 +58,7 @@ def run(recording: Recording, parameters: Parameters) -> Estimate:
     from . import ecf_kernel
 
     inputs = prepare(recording, parameters, mag=True)
-    output = block(len(inputs.time_ns), [4, 3, 3])
+    output = empty(len(inputs.time_ns), (4, 3, 3))
 
     def begin(start: Start) -> tuple[object, object]:
         m0 = _m0(parameters.heading_only, start, math.radians(inputs.declination_deg))
@@ -66,6 +66,7 @@ def run(recording: Recording, parameters: Parameters) -> Estimate:
             parameters.kp,
             parameters.ki,
             parameters.ki_start,
+            parameters.start_gain,
             1.0 / parameters.settle_s,
             parameters.k_acc,
             parameters.k_mag,

@@ -22,7 +22,8 @@ from ..schemas.estimate import Status
 from .loop_kernel import Floats, Span, Times, march
 
 State = tuple[Quaternion, Vector, float, float, float]
-"""Attitude, bias, recent acceleration over the gate squared, one over the usual field's length (0: not known), what is left of the settling."""
+"""Attitude, bias, recent acceleration over the gate squared, one over the usual field's length (0: not known), and
+what is left of the settling, from 1 to 0."""
 Output = tuple[Floats, Floats, Floats]
 
 ACCELEROMETER_REJECTED = int(Status.ACCELEROMETER_REJECTED)
@@ -37,6 +38,7 @@ class Constants(NamedTuple):
     kp: float
     ki: float
     ki_start: float
+    start_gain: float
     settle_rate: float
     k_acc: float
     k_mag: float
@@ -86,6 +88,8 @@ def step(
         else:
             e = cross(field, turned_back(rotation, c.m0))
         wx, wy, wz = wx + weight * e[0], wy + weight * e[1], wz + weight * e[2]
+    boost = 1.0 + c.start_gain * settling
+    wx, wy, wz = boost * wx, boost * wy, boost * wz
     u = (rate[0] - b[0], rate[1] - b[1], rate[2] - b[2])
     q = advance(renormalize(q), u[0] * dt + c.kp * wx, u[1] * dt + c.kp * wy, u[2] * dt + c.kp * wz)
     ki = c.ki + c.ki_start * settling

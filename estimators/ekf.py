@@ -32,7 +32,7 @@ from ..schemas.estimate import Estimate
 from ..schemas.recording import Recording
 from .alignment import GRAVITY, Start
 from .inputs import Inputs, prepare
-from .output import block, result
+from .output import empty, result
 from .parameters import ImuParameters, MargParameters, quantity
 from .registry import Estimator
 from .runs import each_run
@@ -97,7 +97,7 @@ def _run(name: str, inputs: Inputs, noise: Noise, field: tuple[float, float, flo
 
     measured = 3 if inputs.has_mag else 2
     widths = {**WIDTHS, "innovation": measured, "innovation_covariance": measured * measured}
-    output = tuple(block(len(inputs.time_ns), list(widths.values())))
+    output = empty(len(inputs.time_ns), widths.values())
     declination = math.radians(inputs.declination_deg)
     mag_noise, mag_excess, mag_memory_s = field
 
@@ -120,7 +120,9 @@ def _run(name: str, inputs: Inputs, noise: Noise, field: tuple[float, float, flo
             north=(math.sin(declination), math.cos(declination)),
         )
         none = (0.0, 0.0, 0.0)
-        return constants, State(start.orientation, start.bias, none, _covariance(start, noise), 0.0, level, vertical)
+        return constants, State(
+            start.orientation, start.bias, none, _covariance(start, noise), 0.0, level, vertical, 0.0
+        )
 
     each_run(inputs, run, begin, output, mag=True)
     filled = dict(zip(widths, output, strict=True))

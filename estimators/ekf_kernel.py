@@ -23,7 +23,9 @@ MAGNETOMETER_REJECTED = int(Status.MAGNETOMETER_REJECTED)
 DROWNED = 8.0
 """A sensor is marked as rejected where its noise is this many times what it is at best: it weighs a ninth."""
 OUTLIER = 25.0
-"""A heading further off than 5 standard deviations counts as just that far: bounded influence, and no lock-out."""
+"""A heading further off than 5 standard deviations counts as just that far."""
+PATIENCE_S, HASTE = 10.0, 8.0
+"""Rejected for longer than this without a break, the field is believed again, and learnt so many times faster."""
 
 
 class Constants(NamedTuple):
@@ -47,7 +49,7 @@ class Constants(NamedTuple):
 
 class State(NamedTuple):
     """After a sample. ``motion`` is the recent mean square acceleration, in g^2; ``horizontal`` and ``vertical`` are
-    the field that the filter has come to know."""
+    the field that the filter has come to know; ``refused_s`` how long its heading has been an outlier."""
 
     q: Quaternion
     b: Vector
@@ -56,6 +58,7 @@ class State(NamedTuple):
     motion: float
     horizontal: float
     vertical: float
+    refused_s: float
 
 
 class Report(NamedTuple):
@@ -136,7 +139,7 @@ def angle(y: float, x: float) -> float:
 def step(
     c: Constants, state: State, dt: float, rate: Vector, force: Vector, dt_mag: float, field: Vector
 ) -> tuple[State, Report, int]:
-    q, b, before, P, motion, horizontal, vertical = state
+    q, b, before, P, motion, horizontal, vertical, refused_s = state
     flags = 0
 
     # 1. predict: the mean of the interval's rates turns the attitude
@@ -181,18 +184,21 @@ def step(
             noise_heading = (c.field + c.field_excess * odd) / dt_mag
             a, x, _ = P
             bound = heading * heading / OUTLIER - a[5]
-            if bound > noise_heading:
-                noise_heading = bound
+            drowned = c.field_excess * odd > DROWNED * c.field
+            if drowned or bound > noise_heading:
                 flags |= MAGNETOMETER_REJECTED
-            if c.field_excess * odd > DROWNED * c.field:
-                flags |= MAGNETOMETER_REJECTED
+                refused_s += dt_mag
+                if bound > noise_heading and refused_s < PATIENCE_S:
+                    noise_heading = bound
+            else:
+                refused_s = 0.0
             s = a[5] + noise_heading
             P, d = condition(P, (a[2], a[4], a[5], x[6], x[7], x[8]), s, heading - d[2], d)
-            share = dt_mag * c.forget
+            share = min(dt_mag * (c.forget if refused_s < PATIENCE_S else HASTE * c.forget), 1.0)
             horizontal, vertical = horizontal + share * (level - horizontal), vertical + share * (f[2] - vertical)
 
     # 4. move the correction into the attitude and the bias
     q = multiply(exponential(d[0], d[1], d[2]), q)
     b = (b[0] + d[3], b[1] + d[4], b[2] + d[5])
     report = Report((tilt_x, tilt_y, heading), prior, (noise_tilt, noise_tilt, noise_heading), d, rate_noise)
-    return State(q, b, rate, P, motion, horizontal, vertical), report, flags
+    return State(q, b, rate, P, motion, horizontal, vertical, refused_s), report, flags

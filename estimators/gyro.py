@@ -14,7 +14,7 @@ from ..schemas.estimate import Estimate
 from ..schemas.recording import Recording
 from .alignment import Start
 from .inputs import prepare
-from .output import block, result
+from .output import empty, result
 from .parameters import MargParameters, quantity
 from .registry import Estimator
 from .runs import each_run
@@ -32,7 +32,7 @@ def run(recording: Recording, parameters: Parameters) -> Estimate:
     from . import gyro_kernel
 
     inputs = prepare(recording, parameters, mag=True)
-    output = block(len(inputs.time_ns), [4, 3, 3])
+    output = empty(len(inputs.time_ns), (4, 3, 3))
 
     def begin(start: Start) -> tuple[object, object]:
         return parameters.gyro_lag_s, (start.orientation, start.bias, (0.0, 0.0, 0.0))

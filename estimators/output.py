@@ -1,5 +1,6 @@
-"""Empty results: one block of memory for all that a kernel fills, shared NaN for all that it does not."""
+"""Empty results: memory for what a kernel fills, shared NaN for what it does not."""
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -26,16 +27,9 @@ WIDTHS = {
 }
 
 
-def block(n: int, widths: list[int]) -> list[Floats]:
-    """Contiguous arrays (n, width) cut from one allocation: large enough for huge pages, which halves its cost."""
-    memory = np.empty(n * sum(widths))
-    ends = np.cumsum([0, *widths]) * n
-    return [memory[ends[i] : ends[i + 1]].reshape(n, width) for i, width in enumerate(widths)]
-
-
-def nothing(n: int, width: int) -> Floats:
-    """NaN, (n, width), without memory of its own; read-only."""
-    return np.broadcast_to(np.float64(np.nan), (n, width))
+def empty(n: int, widths: Iterable[int]) -> tuple[Floats, ...]:
+    """Arrays (n, width) for a kernel to fill."""
+    return tuple(np.empty((n, width)) for width in widths)
 
 
 def result(
@@ -49,7 +43,8 @@ def result(
 ) -> Estimate:
     """An Estimate of ``filled``, NaN elsewhere; `attlog.estimators.estimate` sets its name and parameters."""
     n = len(inputs.time_ns)
-    fields: dict[str, Any] = {key: filled[key] if key in filled else nothing(n, width) for key, width in WIDTHS.items()}
+    nothing = np.broadcast_to(np.float64(np.nan), (n, 9))  # NaN without memory of its own, read-only
+    fields: dict[str, Any] = {key: filled.get(key, nothing[:, :width]) for key, width in WIDTHS.items()}
     return Estimate(
         name=name,
         estimator=name,

@@ -6,6 +6,7 @@ import types
 import typing
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import cache
 from typing import Any
 
 from ..schemas.errors import UsageError
@@ -39,8 +40,8 @@ def parse(text: str) -> Selection:
     given_name = options.pop("as", None)
     preset = options.pop("preset", None)
     base = _preset(estimator, preset)
-    hints = typing.get_type_hints(estimator.parameters)
-    known = [field.name for field in dataclasses.fields(estimator.parameters)]
+    hints = _types(estimator.parameters)
+    known = list(hints)
     for key in options:
         if key not in known:
             raise UsageError(
@@ -66,6 +67,12 @@ def estimate(recording: Recording, selection: Selection | str) -> Estimate:
     return dataclasses.replace(
         result, name=chosen.name, estimator=chosen.estimator.name, parameters=as_mapping(chosen.parameters)
     )
+
+
+@cache
+def _types(parameters: type[ImuParameters]) -> dict[str, Any]:
+    hints = typing.get_type_hints(parameters)
+    return {field.name: hints[field.name] for field in dataclasses.fields(parameters)}
 
 
 def _options(text: str, tail: str) -> dict[str, str]:
