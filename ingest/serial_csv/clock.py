@@ -116,9 +116,10 @@ class _Walk:
     def _is_glitch(self, number: int, last: int | None, edges: list[int]) -> bool:
         """Whether a short piece is left out and one of the next goes on from the last good sample."""
         start, end, count = edges[number], edges[number + 1], len(self.device_ns)
-        if last is None or end == count:
-            pair = (start, end) if last is None else (last, start)
-            return end - start == 1 and count > 2 and not self._plausible(*pair)
+        if last is None:
+            return number == 0 and end == 1 < count - 1 and not self._plausible(start, end)
+        if end == count:
+            return end - start == 1 and count > 2 and not self._plausible(last, start)
         if self._near(last, start):
             return False
         later = [edge for edge in edges[number + 1 : number + 1 + GLITCH_SAMPLES] if edge - start <= GLITCH_SAMPLES]

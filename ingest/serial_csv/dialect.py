@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
+import numpy as np
+
 from .names import meaning
 from .text import Bytes, decoded, is_labelled, labels
 from .units import Quantity
@@ -16,6 +18,11 @@ FEW_LINES: Final = 60
 """These are looked at first, and alone where they have a header and data."""
 MIN_FIELDS: Final = 4
 MIN_LINES: Final = 3
+"""Of data, in a file without known names; with them, one is enough."""
+LEAST_DATA: Final = 0.25
+"""Of the sample's bytes, in lines of data."""
+MOST_NULS: Final = 0.1
+"""A file with a larger part of NUL bytes is no text."""
 COMMENT_MARKS: Final = (b"#", b"//", b"%", b";")
 
 _NUMBER: Final = rb"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|[-+]?(?:nan|inf|ovf|null|none|n/a)"
@@ -60,7 +67,7 @@ _WAYS: Final = ((b",", b"."), (b";", b"."), (b";", b","), (b"\t", b"."), (b"\t",
 def sniff(head: Bytes) -> Dialect | None:
     """The dialect of a file that begins with ``head``; None where it is no table of numbers."""
     plain = decoded(head[:SAMPLE_BYTES])
-    if b"\0" in plain[:4096].tobytes():
+    if np.count_nonzero(plain == 0) > MOST_NULS * len(plain):
         return None
     lines = plain.tobytes().split(b"\n")[: MAX_SAMPLE_LINES + 1]
     lines = lines[:-1] if len(lines) > 2 else lines
@@ -82,13 +89,16 @@ def _measured(lines: Sequence[bytes], delimiter: bytes, decimal: bytes) -> tuple
     if 2 * sum(is_labelled(line, delimiter) for line in lines) > sum(bool(line.strip()) for line in lines):
         return _labelled(lines, bare)
     rows = [bare.split(line) for line in lines]
-    data = [row for row in rows if _is_data(row, bare)]
-    if len(data) < min(MIN_LINES, max(1, sum(map(bool, lines)) - 2)):
+    chosen = [number for number, row in enumerate(rows) if _is_data(row, bare)]
+    data, size = [rows[number] for number in chosen], sum(len(lines[number]) for number in chosen)
+    if not data or size < LEAST_DATA * sum(map(len, lines)):
         return None
     width = Counter(map(len, data)).most_common(1)[0][0]
     data = [row for row in data if len(row) == width]
-    numbers = sum(bare.number(field) and bool(field.strip()) for row in data for field in row)
     names, header = _header(lines, bare, width)
+    if len(data) < MIN_LINES and not any(meaning(name).quantity is not Quantity.OTHER for name in names):
+        return None
+    numbers = sum(bare.number(field) and bool(field.strip()) for row in data for field in row)
     texts = tuple(_mostly_text([row[column] for row in data], bare) for column in range(width))
     return (numbers, len(data)), Dialect(delimiter, decimal, width, names, header, texts)
 

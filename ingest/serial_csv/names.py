@@ -185,7 +185,7 @@ def _angle(tokens: list[str], unit: str) -> Meaning | None:
 def _time(tokens: list[str], unit: str) -> Meaning | None:
     """A clock. Its unit stands in brackets, at the name's end (``time_us``), or is the name (``millis``)."""
     words = [token for token in tokens if token not in ("utc", "unix", "epoch", "arduino", "device", "local", "imu")]
-    for length in (len(words), len(words) - 1):
+    for length in (len(words) - 1, len(words)):
         name, tail = "".join(words[:length]), "".join(words[length:])
         if name not in TIME_NAMES:
             continue

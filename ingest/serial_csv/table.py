@@ -1,6 +1,7 @@
 """The lines of data as columns of numbers, parsed by Arrow, and every other line counted."""
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -21,7 +22,7 @@ NULLS: Final = ["", " ", "nan", "NaN", "NAN", "ovf", "OVF", "null", "NULL", "Non
 """What stands for a value that is not there; Arduino prints ovf for a float beyond 4294967040."""
 BLOCK_BYTES: Final = 4 << 20
 _NUMBER: Final = r"^\s*$|(?i)^\s*[-+]?((\d+[.,]?\d*|[.,]\d+)([eE][-+]?\d+)?|nan|inf|ovf|null|none|n/a)\s*$"
-_INTEGER: Final = r"^\s*[-+]?\d{1,18}\s*$"
+_INTEGER: Final = r"^\s*[-+]?\d{1,19}\s*$"
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,10 +144,10 @@ def _exact_kind(data: Bytes, dialect: Dialect, exact: int | None) -> Any:
     fields = [dialect.split(line)[exact].strip() for line in head if len(dialect.split(line)) == dialect.fields]
     if not fields or any(b"e" in field.lower() or not field for field in fields):
         return None
-    if all(field.lstrip(b"+-").isdigit() and len(field) < 19 for field in fields):
+    if all(field.lstrip(b"+-").isdigit() for field in fields):
         return pa.int64()
     whole = max(len(field.lstrip(b"+-").split(dialect.decimal)[0]) for field in fields)
-    return pa.decimal128(28, 9) if whole > 8 else None
+    return pa.decimal128(28, 9) if 8 < whole < 11 else None
 
 
 def _array(column: Any) -> NDArray[Any]:
@@ -159,10 +160,10 @@ def _array(column: Any) -> NDArray[Any]:
 def _nanoseconds(column: Any) -> NDArray[Any]:
     """Decimals of 9 places as whole billionths: the low eight bytes of each 128-bit number."""
     chunk: Any = pa.concat_arrays(column.chunks)
-    if chunk.null_count:
+    halves = np.frombuffer(chunk.buffers()[1], "<i8").reshape(-1, 2)[chunk.offset : chunk.offset + len(chunk)]
+    if chunk.null_count or np.any(halves[:, 1] != halves[:, 0] >> 63):
         return np.asarray(chunk.cast(pa.float64()).to_numpy(zero_copy_only=False))
-    low = np.frombuffer(chunk.buffers()[1], "<i8")[::2]
-    return np.ascontiguousarray(low[chunk.offset : chunk.offset + len(chunk)]).view(BILLIONTHS)
+    return np.ascontiguousarray(halves[:, 0]).view(BILLIONTHS)
 
 
 BILLIONTHS: Final = np.dtype("<m8[ns]")
@@ -187,6 +188,7 @@ def _converted(column: Any, dialect: Dialect, is_text: bool, exact: bool) -> NDA
         return np.asarray(column.cast(pa.binary()).to_numpy())
     plain = pc.utf8_trim_whitespace(pc.replace_substring(column, dialect.decimal.decode(), "."))
     if exact and pc.all(pc.match_substring_regex(plain, _INTEGER)).as_py():
-        return np.asarray(plain.cast(pa.int64()).to_numpy())
+        with suppress(pa.ArrowInvalid):  # beyond 64 bits
+            return np.asarray(plain.cast(pa.int64()).to_numpy())
     plain = pc.if_else(pc.is_in(plain, value_set=pa.array(NULLS)), None, plain)
     return np.asarray(plain.cast(pa.float64()).to_numpy())
