@@ -51,7 +51,8 @@ class _Probe:
         if isinstance(kind, MessageType):
             self.message(kind, path)
         elif kind in TEXT_TYPES:
-            self.at += self.word(path)
+            length = self.word(path)
+            self.at += length
         else:
             self.primitives(kind, 1)
 
