@@ -24,6 +24,7 @@ from ...geometry.quaternions import (
     to_rotation_vector,
 )
 from ...schemas.columns import Time
+from ...signals.interpolation import covered
 
 Floats = NDArray[np.float64]
 
@@ -52,7 +53,9 @@ class Frames:
 def frames(imu_ns: Time, rate: Floats, force: Floats, reference_ns: Time, reference: Floats) -> Frames:
     """R_W and R_B from rate and specific force (n, 3), rad/s and m/s^2, and a reference (m, 4) on the same clock."""
     body, residual = _body(imu_ns, rate, reference_ns, reference)
-    inside = (imu_ns >= reference_ns[0]) & (imu_ns <= reference_ns[-1])
+    inside = covered(reference_ns, imu_ns)
+    if not np.any(inside):
+        return Frames(IDENTITY, body, residual)
     at = slerp(reference_ns, reference, imu_ns[inside])
     up = rotate(multiply(at, body), force[inside]).mean(axis=0)
     return Frames(_upright(up), body, residual)
@@ -65,9 +68,13 @@ def _body(imu_ns: Time, rate: Floats, reference_ns: Time, reference: Floats) -> 
     q = slerp(reference_ns, reference, edges)
     turned = to_rotation_vector(multiply(conjugate(q[:-1]), q[1:])) / (STEP_NS * 1e-9)
     felt = np.diff(_integral(imu_ns, rate, edges), axis=0) / (STEP_NS * 1e-9)
-    good = np.isfinite(turned).all(axis=1)
-    turned, felt = turned[good], felt[good] - np.median(felt[good], axis=0) + np.median(turned[good], axis=0)
-    u, size, vt = np.linalg.svd(turned.T @ felt / max(len(felt), 1))
+    seen = covered(reference_ns, edges)
+    good = seen[1:] & seen[:-1]
+    if np.count_nonzero(good) < 4:
+        return IDENTITY, float("nan")
+    # The gyroscope's bias goes out with the means.
+    turned, felt = turned[good] - turned[good].mean(axis=0), felt[good] - felt[good].mean(axis=0)
+    u, size, vt = np.linalg.svd(turned.T @ felt / len(felt))
     if size[0] < MIN_RATE**2 or size[1] < MIN_EXCITATION * size[0]:
         return IDENTITY, float("nan")
     matrix = u @ np.diag([1.0, 1.0, np.sign(np.linalg.det(u) * np.linalg.det(vt))]) @ vt

@@ -103,8 +103,8 @@ def _clocked(table: Table, layout: Layout, csv: CsvOptions, source: str) -> tupl
     layout = replace(layout, time_unit=unit)
     if guess is not None:
         layout = with_guess(layout, guess)
-    dropped = {NO_TIME: ~valid}
-    dropped[NO_VALUE] = _empty(table, layout.time) & valid
+    dropped = {NO_VALUE: _empty(table, layout.time)}
+    dropped[NO_TIME] = ~valid & ~dropped[NO_VALUE]
     dropped[REPEATED] = _repeats(table, ns) & valid & ~dropped[NO_VALUE]
     keep = ~np.logical_or.reduce(list(dropped.values()))
     if not np.any(keep):

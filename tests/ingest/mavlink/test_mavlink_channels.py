@@ -135,17 +135,22 @@ def test_attitudes_without_trim(log: Any, messages: Any, tape: Any) -> None:
         assert found.channel.metadata["trim_rad"] == "0 0"
 
 
-def test_trim_is_turned_back(log: Any, messages: Any, tape: Any) -> None:
-    """ArduPilot sends R_board R(trim)^T; what comes back is R_board."""
+@pytest.mark.parametrize("ekf_type", [0, 3])
+def test_trim_is_turned_back(log: Any, messages: Any, tape: Any, ekf_type: int) -> None:
+    """DCM sends R_board R(trim)^T, the EKFs Euler angles less the trim; what comes back is the board's attitude."""
     trim = np.array([0.02, -0.1234])
-    board = Rotation.from_euler("ZYX", ANGLES[::-1])
-    sent = (board * Rotation.from_euler("ZYX", [0, *trim[::-1]]).inv()).as_euler("ZYX")[::-1]
-    for name, value in zip(("AHRS_TRIM_X", "AHRS_TRIM_Y"), trim, strict=True):
+    turned = Rotation.from_euler("ZYX", ANGLES[::-1]) * Rotation.from_euler("ZYX", [0, *trim[::-1]]).inv()
+    dcm, ekf = turned.as_euler("ZYX")[::-1], ANGLES - [*trim, 0]
+    for name, value in zip(("AHRS_TRIM_X", "AHRS_TRIM_Y", "AHRS_EKF_TYPE"), (*trim, ekf_type), strict=True):
         log.send(0, parameter(messages, name, value))
-    log.send(1, messages.MAVLink_attitude_message(1000, *sent, 0, 0, 0))
-    found = tape.channel(log.read(), "/onboard/attitude/attitude")
-    assert found.data["rpy_ned_deg"][0] == pytest.approx(np.degrees(ANGLES), abs=1e-4)
-    assert [float(value) for value in found.channel.metadata["trim_rad"].split()] == pytest.approx(trim)
+    log.send(1, messages.MAVLink_attitude_message(1000, *(ekf if ekf_type else dcm), 0, 0, 0))
+    log.send(1, messages.MAVLink_ahrs2_message(*(dcm if ekf_type else ekf), 0, 0, 0))
+    log.send(1, messages.MAVLink_attitude_quaternion_message(1000, *turned.as_quat()[[3, 0, 1, 2]], 0, 0, 0))
+    ingested = log.read()
+    for source in ("attitude", "ahrs2", "attitude_quaternion"):
+        found = tape.channel(ingested, f"/onboard/{source}/attitude")
+        assert found.data["rpy_ned_deg"][0] == pytest.approx(np.degrees(ANGLES), abs=1e-4)
+        assert [float(value) for value in found.channel.metadata["trim_rad"].split()] == pytest.approx(trim)
 
 
 def test_unknown_trim_is_a_finding(log: Any, messages: Any, tape: Any) -> None:
