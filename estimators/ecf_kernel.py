@@ -60,15 +60,16 @@ def step(
     flags = 0
     rotation = matrix(q)
     up = (rotation[6], rotation[7], rotation[8])  # v_hat of gravity: R^T e_z
+    boost = 1.0 + c.start_gain * settling
     if c.gate > 0.0:
-        weight = c.k_acc * dt / (c.gravity * (1.0 + motion * (1.0 - settling * settling)))
+        weight = boost * c.k_acc * dt / (c.gravity * (1.0 + motion * (1.0 - settling * settling)))
         x, y, z = force[0] - c.gravity * up[0], force[1] - c.gravity * up[1], force[2] - c.gravity * up[2]
         motion += min(c.motion_rate * dt, 1.0) * ((x * x + y * y + z * z) * c.gate - motion)
         if motion > DROWNED:
             flags |= ACCELEROMETER_REJECTED
     else:
         length = norm(force)
-        weight = c.k_acc * dt / length if length > 0.0 else 0.0
+        weight = boost * c.k_acc * dt / length if length > 0.0 else 0.0
     e = cross(force, up)
     wx, wy, wz = weight * e[0], weight * e[1], weight * e[2]  # w_mes, times the interval of the sensor it comes from
     if dt_mag > 0.0:
@@ -79,7 +80,7 @@ def step(
         odd = share * share * c.mag_gate
         if odd > DROWNED:
             flags |= MAGNETOMETER_REJECTED
-        weight = c.k_mag * dt_mag * per_usual / (1.0 + odd)
+        weight = boost * c.k_mag * dt_mag * per_usual / (1.0 + odd)
         per_usual -= per_usual * share * min(dt_mag * c.forget, 1.0)
         if c.heading_only:
             f = turned(rotation, field)
@@ -88,8 +89,6 @@ def step(
         else:
             e = cross(field, turned_back(rotation, c.m0))
         wx, wy, wz = wx + weight * e[0], wy + weight * e[1], wz + weight * e[2]
-    boost = 1.0 + c.start_gain * settling
-    wx, wy, wz = boost * wx, boost * wy, boost * wz
     u = (rate[0] - b[0], rate[1] - b[1], rate[2] - b[2])
     q = advance(renormalize(q), u[0] * dt + c.kp * wx, u[1] * dt + c.kp * wy, u[2] * dt + c.kp * wz)
     ki = c.ki + c.ki_start * settling

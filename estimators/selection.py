@@ -40,7 +40,7 @@ def parse(text: str) -> Selection:
     given_name = options.pop("as", None)
     preset = options.pop("preset", None)
     base = _preset(estimator, preset)
-    hints = _types(estimator.parameters)
+    hints = _types(estimator)
     known = list(hints)
     for key in options:
         if key not in known:
@@ -70,9 +70,9 @@ def estimate(recording: Recording, selection: Selection | str) -> Estimate:
 
 
 @cache
-def _types(parameters: type[ImuParameters]) -> dict[str, Any]:
-    hints = typing.get_type_hints(parameters)
-    return {field.name: hints[field.name] for field in dataclasses.fields(parameters)}
+def _types(estimator: Estimator) -> dict[str, Any]:
+    hints = typing.get_type_hints(estimator.parameters)
+    return {field.name: hints[field.name] for field in dataclasses.fields(estimator.parameters)}
 
 
 def _options(text: str, tail: str) -> dict[str, str]:
