@@ -1,6 +1,7 @@
 """Attitudes: what the autopilot estimated, and what a simulator knows."""
 
 from collections.abc import Callable, Iterator, Mapping
+from enum import Enum
 from typing import Final
 
 import numpy as np
@@ -22,26 +23,39 @@ def _fields(rows: Table, names: str) -> Floats:
     return result
 
 
-def _euler(group: Group) -> Floats:
-    return orientation_from_rpy_ned(_fields(group.rows, "roll pitch yaw"))
+class Trim(Enum):
+    """How ArduPilot applies AHRS_TRIM to a message's attitude."""
+
+    SUBTRACTED = "subtracted from roll and pitch"
+    ROTATED = "R_sent = R R(trim)^T"
 
 
-def _quaternion(group: Group) -> Floats:
+def _euler(group: Group, trim: Floats | None = None) -> Floats:
+    """roll, pitch, yaw in rad; ``trim`` (3,) is added, where it had been subtracted."""
+    angles = _fields(group.rows, "roll pitch yaw")
+    return orientation_from_rpy_ned(angles if trim is None else angles + trim)
+
+
+def _quaternion(group: Group, trim: Floats | None = None) -> Floats:
     """q1 to q4 are w x y z, body FRD to NED."""
+    assert trim is None
     return enu_flu_from_ned_frd(_fields(group.rows, "q2 q3 q4 q1"))
 
 
-def _hil_quaternion(group: Group) -> Floats:
+def _hil_quaternion(group: Group, trim: Floats | None = None) -> Floats:
     """w x y z, body FRD to NED."""
+    assert trim is None
     return enu_flu_from_ned_frd(group.rows["attitude_quaternion"][:, [1, 2, 3, 0]])
 
 
-Reader = Callable[[Group], Floats]
-ONBOARD: Final[Mapping[str, Reader]] = {
-    "ATTITUDE": _euler,
-    "ATTITUDE_QUATERNION": _quaternion,
-    "AHRS2": _euler,
-    "AHRS3": _euler,
+Reader = Callable[..., Floats]
+# message -> (reader, trim where an EKF is in charge, trim where DCM is). The EKFs give Euler angles less the trim, DCM
+# rotates; AHRS2 is the filter that is not in charge; AP_AHRS::get_quaternion rotates whatever the filter.
+ONBOARD: Final[Mapping[str, tuple[Reader, Trim, Trim]]] = {
+    "ATTITUDE": (_euler, Trim.SUBTRACTED, Trim.ROTATED),
+    "ATTITUDE_QUATERNION": (_quaternion, Trim.ROTATED, Trim.ROTATED),
+    "AHRS2": (_euler, Trim.ROTATED, Trim.SUBTRACTED),
+    "AHRS3": (_euler, Trim.SUBTRACTED, Trim.SUBTRACTED),
 }
 # The first that a log holds is the reference.
 REFERENCES: Final[Mapping[str, Reader]] = {
@@ -63,23 +77,32 @@ def channels(
     columns = list(_reference(frames, line, vehicle))
     findings: list[Finding] = []
     trim = np.array([parameters.get(name, np.nan) for name in TRIM]) if vehicle.is_ardupilot else np.zeros(2)
-    for name, read in ONBOARD.items():
+    for name, (read, with_ekf, with_dcm) in ONBOARD.items():
         group = sent_by(frames, vehicle, name)
         if group is None:
             continue
+        orientation = _untrimmed(group, read, with_ekf if _ekf_in_charge(parameters) else with_dcm, trim)
         about = {}
-        orientation = read(group)
-        if vehicle.is_ardupilot and np.isfinite(trim).all():
-            about["trim_rad"] = " ".join(f"{value:.9g}" for value in trim)
-            if trim.any():
-                orientation = remove_trim(orientation, [*trim, 0.0])
-        elif vehicle.is_ardupilot:
-            about["trim"] = "unknown"
+        if vehicle.is_ardupilot:
+            known = bool(np.isfinite(trim).all())
+            about = {"trim_rad": " ".join(f"{value:.9g}" for value in trim)} if known else {"trim": "unknown"}
         made = _made(line, vehicle, group, f"onboard/{name.lower()}", orientation, about)
         if made is not None:
             columns.append(made)
             findings += [_unknown_trim(made)] if "trim" in about else []
     return columns, findings
+
+
+def _ekf_in_charge(parameters: Mapping[str, float]) -> bool:
+    return parameters.get("AHRS_EKF_TYPE", parameters.get("AHRS_EKF_USE", 1.0)) != 0.0
+
+
+def _untrimmed(group: Group, read: Reader, how: Trim, trim: Floats) -> Floats:
+    """The attitudes of the board, as far as the trim (roll, pitch) is known."""
+    if not (np.isfinite(trim).all() and trim.any()):
+        return read(group)
+    whole = np.array([*trim, 0.0])
+    return read(group, whole) if how is Trim.SUBTRACTED else remove_trim(read(group), whole)
 
 
 def _reference(frames: Frames, line: Timeline, vehicle: Vehicle) -> Iterator[Columns]:

@@ -13,8 +13,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from .rows import WRAP_US
-from .scan import Ints
+from .rows_kernel import WRAP_US
+from .scan_kernel import Ints
 
 STEP_US: Final = 1_000_000
 WINDOW_US: Final = 10_000_000

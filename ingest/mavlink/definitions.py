@@ -29,7 +29,7 @@ C_TYPES: Final = {
     "float": ("float32", "<f4"),
     "double": ("float64", "<f8"),
 }
-# (field, C type) that hold a sample's own time -> how the kernel `rows.gather` reads it
+# (field, C type) that hold a sample's own time -> how the kernel `rows_kernel.gather` reads it
 OWN_TIME: Final = {
     ("time_boot_ms", "uint32_t"): 1,
     ("time_usec", "uint64_t"): 2,
@@ -99,7 +99,7 @@ class Definition:
 
     @cached_property
     def row(self) -> "np.dtype[np.void]":
-        """A row as `rows.gather` lays it out, under the ROS names of `type`."""
+        """A row as `rows_kernel.gather` lays it out, under the ROS names of `type`."""
         names = ros_field_names([f.name for f in LEADING] + [f.name for f in self.fields])
         columns = [f.column for f in self.fields]
         return np.dtype(

@@ -6,10 +6,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from . import rows, scan
-from .crc import Integer
+from . import rows_kernel, scan_kernel
+from .crc_kernel import Integer
 from .definitions import Definition, Dialect
-from .scan import IN_PLACE, LOOSE, STAMP, Bytes, Ints
+from .scan_kernel import IN_PLACE, LOOSE, STAMP, Bytes, Ints
 
 WINDOW: Final = 1 << 16
 DAY_US: Final = 86_400_000_000
@@ -20,7 +20,7 @@ ROUNDS: Final = 4
 
 @dataclass(frozen=True, eq=False)
 class Damage:
-    """What of the bytes is no frame: ``runs`` as `scan.scan` gives them, bytes of a torn last record, and how many
+    """What of the bytes is no frame: ``runs`` as `scan_kernel.scan` gives them, bytes of a torn last record, and how many
     stamps had to be made up because they were lost or impossible.
     """
 
@@ -91,7 +91,7 @@ def find(data: Bytes, dialect: Dialect) -> Frames:
     groups_of, keys, counts = _classify(key_of_frame)
     groups, layout, out = _layout(dialect, keys, counts)
     rows_of, own = np.empty((2, len(places)), np.int64)
-    rows.gather(data, places, stamps, groups_of, layout, out, rows_of, own)
+    rows_kernel.gather(data, places, stamps, groups_of, layout, out, rows_of, own)
     runs, torn = _split_torn(data, runs)
     return Frames(stamped, stamps, groups_of, rows_of, own, groups, Damage(runs, torn, lost, wrong))
 
@@ -99,22 +99,22 @@ def find(data: Bytes, dialect: Dialect) -> Frames:
 def _scan(
     data: Bytes, crc_extra: NDArray[np.int16], stamped: bool, reference: int
 ) -> tuple[Ints, NDArray[np.uint8], Ints]:
-    most = len(data) // scan.SHORTEST + 1
+    most = len(data) // scan_kernel.SHORTEST + 1
     found, kinds, runs = np.empty((3, most), np.int64), np.empty(most, np.uint8), np.empty((most + 1, 4), np.int64)
-    count, bad = scan.scan(data, crc_extra, stamped, reference, found, kinds, runs)
+    count, bad = scan_kernel.scan(data, crc_extra, stamped, reference, found, kinds, runs)
     return found[:, :count], kinds[:count], runs[:bad]
 
 
 def _classify(key_of_frame: Ints) -> tuple[NDArray[np.int32], Ints, Ints]:
     """The group of each frame, in order of first appearance; the groups' keys; how many frames each has."""
     groups_of = np.empty(len(key_of_frame), np.int32)
-    size = rows.FIRST_SIZE
+    size = rows_kernel.FIRST_SIZE
     known: Integer = 0
     done: Integer = 0
     keys, counts = np.empty(size, np.int64), np.zeros(size, np.int64)
     while True:
-        table = np.full(2 * size, rows.FREE, np.int64)
-        known, done = rows.classify(key_of_frame, done, table, keys, counts, known, groups_of)
+        table = np.full(2 * size, rows_kernel.FREE, np.int64)
+        known, done = rows_kernel.classify(key_of_frame, done, table, keys, counts, known, groups_of)
         if done == len(key_of_frame):
             return groups_of, keys[:known], counts[:known]
         size *= 2
@@ -127,7 +127,8 @@ def _split_torn(data: Bytes, runs: Ints) -> tuple[Ints, int]:
         return runs, 0
     start = int(runs[-1, 0])
     torn = len(data) - start
-    return (runs[:-1], torn) if torn <= STAMP or scan.is_magic(data, start) else (runs, 0)
+    begins = data[start] in (scan_kernel.MAGIC_1, scan_kernel.MAGIC_2)
+    return (runs[:-1], torn) if torn <= STAMP or begins else (runs, 0)
 
 
 def detect(data: Bytes, crc_extra: NDArray[np.int16]) -> tuple[bool, int]:
@@ -138,15 +139,15 @@ def detect(data: Bytes, crc_extra: NDArray[np.int16]) -> tuple[bool, int]:
         window *= 8
         places = _places(data[:window], crc_extra)
     if len(places) == 0:
-        return False, scan.NO_STAMP
-    gaps, stamps = scan.gaps_and_stamps(data, places)
+        return False, scan_kernel.NO_STAMP
+    gaps, stamps = scan_kernel.gaps_and_stamps(data, places)
     if np.count_nonzero(gaps == STAMP) <= np.count_nonzero(gaps == 0):
-        return False, scan.NO_STAMP
+        return False, scan_kernel.NO_STAMP
     return True, int(np.sort(stamps[gaps == STAMP])[np.count_nonzero(gaps == STAMP) // 2])
 
 
 def _places(data: Bytes, crc_extra: NDArray[np.int16]) -> Ints:
-    return np.asarray(_scan(data, crc_extra, False, scan.NO_STAMP)[0][0])
+    return np.asarray(_scan(data, crc_extra, False, scan_kernel.NO_STAMP)[0][0])
 
 
 def repair(raw: Ints, kinds: NDArray[np.uint8]) -> tuple[Ints, int]:
@@ -192,7 +193,7 @@ def _outliers(stamps: Ints) -> NDArray[np.bool_]:
 
 
 def _layout(dialect: Dialect, keys: Ints, counts: Ints) -> tuple[tuple[Group, ...], Ints, NDArray[np.uint64]]:
-    """Groups with their still empty rows, and what `rows.gather` needs to fill them."""
+    """Groups with their still empty rows, and what `rows_kernel.gather` needs to fill them."""
     definitions = [dialect.definition(int(key) >> 16) for key in keys]
     words = np.array([d.row_size // 8 for d in definitions], np.int64)
     starts = np.concatenate(([0], np.cumsum(words * counts)))

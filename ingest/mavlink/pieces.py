@@ -12,8 +12,8 @@ import numpy as np
 from . import clocks
 from .clocks import REBOOT, START, STEP, WRAP, Break, Line, Observations
 from .frames import Frames, Group
-from .rows import BOOT_MS, UNIX_US, WRAP_US
-from .scan import Ints
+from .rows_kernel import BOOT_MS, UNIX_US, WRAP_US
+from .scan_kernel import Ints
 
 # Messages without time_boot_ms whose time is that of sending; others (a GPS fix) may be old.
 PROMPT: Final = frozenset({"RAW_IMU", "HIGHRES_IMU"})

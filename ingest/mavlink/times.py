@@ -10,11 +10,11 @@ import numpy as np
 from ...schemas.finding import Finding, Kind, Severity
 from ...schemas.recording import Segment
 from . import pieces
-from .assign import assign
+from .assign_kernel import assign
 from .clocks import REBOOT, STEP, WRAP, Line
 from .frames import Frames, Group
 from .pieces import Clock, Piece
-from .scan import Ints
+from .scan_kernel import Ints
 from .vehicles import Vehicle
 
 FOREVER: Final = int(np.iinfo(np.int64).max)
@@ -73,7 +73,7 @@ def timeline(frames: Frames, vehicles: Sequence[Vehicle]) -> Timeline:
 
 
 def _clocks_of(group: Group, clocks: Sequence[Clock], parents: dict[int, int]) -> tuple[int, int, int, int]:
-    """The clocks that `assign.assign` needs for a group."""
+    """The clocks that `assign_kernel.assign` needs for a group."""
     mine = {c.unix: i for i, c in enumerate(clocks) if (c.system, c.component) == (group.system, group.component)}
     component = parents.get(group.system)
     family = [i for i, c in enumerate(clocks) if c.system == group.system]

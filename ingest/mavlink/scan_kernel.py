@@ -11,8 +11,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ...geometry.jit import kernel
-from .crc import Integer, checksum, implied_extra, with_extra, word
+from ...geometry.jit import kernel, part
+from .crc_kernel import Integer, checksum, implied_extra, with_extra, word
 
 MAGIC_1: Final = 0xFE
 MAGIC_2: Final = 0xFD
@@ -34,7 +34,7 @@ Bytes = NDArray[np.uint8]
 Ints = NDArray[np.int64]
 
 
-@kernel
+@part
 def frame_length(data: Bytes, at: Integer) -> Integer:
     """Bytes of the frame whose header is at ``at``, 0 where there is no header or the data end before it does."""
     size = len(data)
@@ -51,7 +51,7 @@ def frame_length(data: Bytes, at: Integer) -> Integer:
     return length if at + length <= size else 0
 
 
-@kernel
+@part
 def message_id(data: Bytes, at: Integer) -> Integer:
     """The message id of the frame at ``at``."""
     if data[at] == MAGIC_1:
@@ -59,20 +59,20 @@ def message_id(data: Bytes, at: Integer) -> Integer:
     return np.int64(data[at + 7]) | (np.int64(data[at + 8]) << 8) | (np.int64(data[at + 9]) << 16)
 
 
-@kernel
+@part
 def key_of(data: Bytes, at: Integer) -> Integer:
     """Message id, system id and component id of the frame at ``at``, in one number."""
     first = at + 3 if data[at] == MAGIC_1 else at + 5
     return (message_id(data, at) << 16) | (np.int64(data[first]) << 8) | np.int64(data[first + 1])
 
 
-@kernel
+@part
 def extra_of(crc_extra: NDArray[np.int16], identity: Integer) -> Integer:
     """CRC_EXTRA of a message, -1 where the dialect does not know it."""
     return int(crc_extra[identity]) if identity < len(crc_extra) else -1
 
 
-@kernel
+@part
 def sums(data: Bytes, at: Integer) -> tuple[Integer, Integer]:
     """The checksum of the frame at ``at`` before CRC_EXTRA, and the one that it carries."""
     header = HEADER_1 if data[at] == MAGIC_1 else HEADER_2
@@ -80,7 +80,7 @@ def sums(data: Bytes, at: Integer) -> tuple[Integer, Integer]:
     return checksum(data, at + 1, end), np.int64(data[end]) | (np.int64(data[end + 1]) << 8)
 
 
-@kernel
+@part
 def known_frame(data: Bytes, at: Integer, crc_extra: NDArray[np.int16]) -> tuple[Integer, Integer]:
     """(bytes, `key_of`) of the frame at ``at`` where it is right and its message known, else (0, 0).
 
@@ -119,7 +119,7 @@ def known_frame(data: Bytes, at: Integer, crc_extra: NDArray[np.int16]) -> tuple
     return length, identity << 16 | sender
 
 
-@kernel
+@part
 def extra_in(data: Bytes, at: Integer) -> Integer:
     """The CRC_EXTRA that makes the checksum of the frame at ``at`` right, -1 where none does or no frame is there."""
     if frame_length(data, at) == 0:
@@ -128,13 +128,13 @@ def extra_in(data: Bytes, at: Integer) -> Integer:
     return implied_extra(crc, carried)
 
 
-@kernel
+@part
 def is_magic(data: Bytes, at: Integer) -> bool:
     """Whether a frame could begin at ``at``."""
     return bool(at < len(data) and (data[at] == MAGIC_1 or data[at] == MAGIC_2))
 
 
-@kernel
+@part
 def stamp_at(data: Bytes, at: Integer) -> Integer:
     """The big-endian stamp at ``at`` in microseconds, NO_STAMP where it is beyond the year 2112."""
     high, low = np.int64(0), np.int64(0)
@@ -144,13 +144,13 @@ def stamp_at(data: Bytes, at: Integer) -> Integer:
     return NO_STAMP if high >> 20 else high << 32 | low
 
 
-@kernel
+@part
 def near(stamp: Integer, other: Integer) -> bool:
     """Whether two stamps are within a day."""
     return bool(-CREDIBLE_US <= stamp - other <= CREDIBLE_US)
 
 
-@kernel
+@part
 def stamp_is_credible(data: Bytes, at: Integer, last: Integer) -> bool:
     """Whether a stamp within a day of ``last`` is at ``at``, and something behind it."""
     if at + STAMP >= len(data):
@@ -159,13 +159,13 @@ def stamp_is_credible(data: Bytes, at: Integer, last: Integer) -> bool:
     return bool(stamp >= 0 and near(stamp, last))
 
 
-@kernel
+@part
 def record_begins(data: Bytes, at: Integer, last: Integer) -> bool:
     """Whether a credible stamp and then a header's first byte are at ``at``."""
     return bool(is_magic(data, at + STAMP) and stamp_is_credible(data, at, last))
 
 
-@kernel
+@part
 def holds_known_frame(data: Bytes, start: Integer, stop: Integer, crc_extra: NDArray[np.int16]) -> bool:
     """Whether a right frame of a known message begins in ``[start, stop)``."""
     for at in range(start, stop):  # noqa: SIM110 - Numba has no any() of a generator
@@ -186,7 +186,7 @@ def gaps_and_stamps(data: Bytes, places: Ints) -> tuple[Ints, Ints]:
     return gaps, stamps
 
 
-@kernel
+@part
 def unknown_frame(
     data: Bytes, at: Integer, crc_extra: NDArray[np.int16], stamped: bool, last: Integer, in_place: bool
 ) -> Integer:
@@ -204,7 +204,7 @@ def unknown_frame(
     return length if in_place and not holds_known_frame(data, at + 1, end, crc_extra) else 0
 
 
-@kernel
+@part
 def next_right(
     data: Bytes, at: Integer, crc_extra: NDArray[np.int16], stamped: bool, last: Integer
 ) -> tuple[Integer, Integer]:

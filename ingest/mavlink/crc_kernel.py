@@ -5,7 +5,7 @@ from typing import Any, Final, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from ...geometry.jit import kernel
+from ...geometry.jit import part
 
 Integer: TypeAlias = int | np.signedinteger[Any]
 """What numbers are inside kernels; a plain int(...) of unsigned bytes would be unsigned there."""
@@ -30,7 +30,7 @@ TABLES: Final = _tables()
 INDEX_OF_HIGH: Final = np.argsort(TABLES[0] >> 8).astype(np.uint8)
 
 
-@kernel
+@part
 def word(data: NDArray[np.uint8], at: Integer) -> np.uint64:
     """Eight bytes, little-endian; the compiler makes it one load."""
     i = np.uint64(at)
@@ -46,7 +46,7 @@ def word(data: NDArray[np.uint8], at: Integer) -> np.uint64:
     )
 
 
-@kernel
+@part
 def folded(eight: np.uint64, after: Integer) -> Integer:
     """CRC, begun with 0, of eight bytes and as many zero bytes as ``after`` says (0 or 8)."""
     byte = np.uint64(0xFF)
@@ -62,7 +62,7 @@ def folded(eight: np.uint64, after: Integer) -> Integer:
     )
 
 
-@kernel
+@part
 def checksum(data: NDArray[np.uint8], start: Integer, stop: Integer) -> Integer:
     """CRC of ``data[start:stop]``, before CRC_EXTRA.
 
@@ -87,7 +87,7 @@ def checksum(data: NDArray[np.uint8], start: Integer, stop: Integer) -> Integer:
     return np.int64(crc)
 
 
-@kernel
+@part
 def bytewise(data: NDArray[np.uint8], start: Integer, stop: Integer) -> Integer:
     """`checksum` without reading behind ``stop``."""
     crc = INITIAL
@@ -96,13 +96,13 @@ def bytewise(data: NDArray[np.uint8], start: Integer, stop: Integer) -> Integer:
     return np.int64(crc)
 
 
-@kernel
+@part
 def with_extra(crc: Integer, extra: Integer) -> Integer:
     """The CRC after one more byte, CRC_EXTRA."""
     return (crc >> 8) ^ np.int64(TABLES[0, np.uint64((crc ^ extra) & 0xFF)])
 
 
-@kernel
+@part
 def implied_extra(crc: Integer, received: Integer) -> Integer:
     """The CRC_EXTRA that makes ``received`` right, -1 where none does (255 of 256 times, in garbage)."""
     wanted = received ^ (crc >> 8)

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...geometry.jit import kernel
-from .rows import UNIX_US
-from .scan import Ints
+from .rows_kernel import UNIX_US
+from .scan_kernel import Ints
 
 EARLY_US: Final = 2_000_000
 LATE_US: Final = 60_000_000

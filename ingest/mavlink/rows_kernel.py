@@ -8,9 +8,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ...geometry.jit import kernel
-from .crc import Integer, word
-from .scan import HEADER_1, HEADER_2, MAGIC_1, Bytes, Ints
+from ...geometry.jit import kernel, part
+from .crc_kernel import Integer, word
+from .scan_kernel import HEADER_1, HEADER_2, MAGIC_1, Bytes, Ints
 
 NO_TIME: Final = -1
 UNIX_US: Final = 1_000_000_000_000_000
@@ -27,7 +27,7 @@ FREE: Final = -1
 FIRST_SIZE: Final = 1024
 
 
-@kernel
+@part
 def slot_of(table: Ints, keys: Ints, key: Integer) -> Integer:
     """Where ``key`` is in an open-addressing table of numbers of keys (its size a power of two), or where it goes."""
     mask = len(table) - 1
@@ -61,14 +61,14 @@ def classify(
     return known, len(key_of_frame)
 
 
-@kernel
+@part
 def extend_short(value: Integer, near: Integer) -> Integer:
     """Microseconds of which only 32 bits were sent: the time nearest to ``near`` that ends in them."""
     period = 1 << 32
     return near + (value - near + period // 2) % period - period // 2
 
 
-@kernel
+@part
 def own_time(out: NDArray[np.uint64], at: Integer, how: Integer, near: Integer) -> Integer:
     """A message's own time in microseconds, NO_TIME where it is not set (0).
 
@@ -88,7 +88,7 @@ def own_time(out: NDArray[np.uint64], at: Integer, how: Integer, near: Integer) 
     return own if own >= UNIX_US else own % WRAP_US
 
 
-@kernel
+@part
 def copy_payload(data: Bytes, at: Integer, length: Integer, out: NDArray[np.uint64], to: Integer) -> None:
     """Copy ``length`` bytes to ``out`` from its word ``to`` on, in words where the data are long enough."""
     whole, odd = length >> 3, length & 7
