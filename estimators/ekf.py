@@ -59,7 +59,7 @@ class Noise(ImuParameters):
     gyro_noise: float = quantity(0.0006, "rad/s/rtHz", "density of the gyro's noise")
     bias_walk: float = quantity(0.00004, "rad/s/rts", "random walk of the gyro's bias")
     bias_sigma: float = quantity(0.02, "rad/s", "bias at the start, where no rest shows it")
-    rate_error: float = quantity(0.04, "", "share of a step's rate change that is error")
+    rate_error: float = quantity(0.1, "", "share of a step's rate change that is error")
     scale_error: float = quantity(0.003, "1/rtHz", "gyro noise per rad/s of turning: scale and misalignment")
     acc_noise: float = quantity(0.08, "m/s^2/rtHz", "density of linear acceleration", minimum=1e-9)
     acc_motion: float = quantity(0.16, "1/rtHz", "more of it per m/s^2 of recent acceleration")

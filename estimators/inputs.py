@@ -18,6 +18,10 @@ LOW_RATE_NS = 100_100_000
 """Median interval beyond which attitude estimates are not to be trusted: 10 Hz, and 0.1 % for jitter."""
 BRIDGED_INTERVALS = 5.0
 COASTED_INTERVALS = 2.5
+TOLD_GAP_S = 0.1
+"""Gaps shorter than this, or than five intervals, are nothing to tell."""
+RESTARTED = (Severity.WARN, "no samples: the estimate starts anew behind the gap, with the bias that it had")
+BRIDGED = (Severity.INFO, "no samples: bridged with the mean of the rates around the gap")
 MAX_FINDINGS = 50
 """Gaps reported one by one; the rest as one finding, lest a radio log drown in them."""
 
@@ -77,11 +81,14 @@ def prepare(recording: Recording, parameters: ImuParameters, *, mag: bool, needs
     if longest > LOW_RATE_NS and 2 * int(np.count_nonzero(intervals > LOW_RATE_NS)) > len(intervals):
         status |= np.uint32(Status.LOW_RATE)
         findings.append(_low_rate(time_ns, topic, interval_s))
-    max_gap_s = max(parameters.max_gap_s, BRIDGED_INTERVALS * interval_s)
-    gaps = np.flatnonzero(intervals > max_gap_s * 1e9).tolist() if longest > max_gap_s * 1e9 else []
-    runs = _runs(recording, time_ns, gaps)
+    told_ns = max(TOLD_GAP_S, BRIDGED_INTERVALS * interval_s) * 1e9
+    wide = (np.flatnonzero(intervals > told_ns) + 1).tolist() if longest > told_ns else []
+    max_gap_ns = max(parameters.max_gap_s * 1e9, BRIDGED_INTERVALS * interval_s * 1e9)
+    runs = _runs(recording, time_ns, [index for index in wide if intervals[index - 1] > max_gap_ns])
     status[[run.first for run in runs]] |= np.uint32(Status.RESTART)
-    findings += _gaps(time_ns, runs, topic)
+    findings += _gaps(time_ns, [run.first for run in runs if not run.fresh], topic, RESTARTED)
+    starts = {run.first for run in runs}
+    findings += _gaps(time_ns, [index for index in wide if index not in starts], topic, BRIDGED)
     north, declination_deg = North.ARBITRARY, 0.0
     if len(mag_time_ns):
         north, declination_deg = _north(recording)
@@ -167,7 +174,7 @@ def _median_s(intervals: NDArray[np.int64]) -> float:
 
 
 def _runs(recording: Recording, time_ns: Times, gaps: list[int]) -> tuple[Run, ...]:
-    starts = {0: True} | {index + 1: False for index in gaps}
+    starts = {0: True} | dict.fromkeys(gaps, False)
     for segment in recording.segments:
         index = int(np.searchsorted(time_ns, segment.start_ns))
         if index < len(time_ns):
@@ -177,17 +184,17 @@ def _runs(recording: Recording, time_ns: Times, gaps: list[int]) -> tuple[Run, .
     return tuple(Run(first, last, starts[first]) for first, last in zip(firsts, lasts, strict=True))
 
 
-def _gaps(time_ns: Times, runs: tuple[Run, ...], topic: str) -> list[Finding]:
-    gaps = [run.first for run in runs if not run.fresh]
-    advice = "no samples: the estimate starts anew behind the gap, with the bias that it had"
+def _gaps(time_ns: Times, gaps: list[int], topic: str, what: tuple[Severity, str]) -> list[Finding]:
+    """A finding for each gap, given the first samples behind them."""
+    severity, advice = what
     findings = []
     for index in gaps[:MAX_FINDINGS]:
         start, end = int(time_ns[index - 1]), int(time_ns[index])
-        findings.append(Finding(start, end, Severity.WARN, Kind.GAP, topic, (end - start) * 1e-9, "s", advice))
+        findings.append(Finding(start, end, severity, Kind.GAP, topic, (end - start) * 1e-9, "s", advice))
     if len(gaps) > MAX_FINDINGS:
         start, end = int(time_ns[gaps[MAX_FINDINGS] - 1]), int(time_ns[gaps[-1]])
         more = float(len(gaps) - MAX_FINDINGS)
-        findings.append(Finding(start, end, Severity.WARN, Kind.GAP, topic, more, "more gaps", advice))
+        findings.append(Finding(start, end, severity, Kind.GAP, topic, more, "more gaps", advice))
     return findings
 
 

@@ -26,7 +26,7 @@ class ImuParameters:
     """Which IMU, and when to start anew."""
 
     imu: int = choice(0, "number of the IMU")
-    max_gap_s: float = quantity(0.2, "s", "longest interval to bridge; at least 5 median intervals are bridged")
+    max_gap_s: float = quantity(0.5, "s", "longest interval to bridge; at least 5 median intervals are bridged")
 
 
 @dataclass(frozen=True)
