@@ -28,6 +28,8 @@ Output = tuple[Floats, Floats, Floats]
 
 ACCELEROMETER_REJECTED = int(Status.ACCELEROMETER_REJECTED)
 MAGNETOMETER_REJECTED = int(Status.MAGNETOMETER_REJECTED)
+SHOCK = 4.0
+"""Accelerations beyond 2 g count as that, in g^2."""
 DROWNED = 8.0
 """A sensor is marked as rejected where it weighs less than a ninth of what it does at best."""
 
@@ -64,7 +66,8 @@ def step(
     if c.gate > 0.0:
         weight = boost * c.k_acc * dt / (c.gravity * (1.0 + motion * (1.0 - settling * settling)))
         x, y, z = force[0] - c.gravity * up[0], force[1] - c.gravity * up[1], force[2] - c.gravity * up[2]
-        motion += min(c.motion_rate * dt, 1.0) * ((x * x + y * y + z * z) * c.gate - motion)
+        moved = min(x * x + y * y + z * z, SHOCK * c.gravity * c.gravity) * c.gate
+        motion += min(c.motion_rate * dt, 1.0) * (moved - motion)
         if motion > DROWNED:
             flags |= ACCELEROMETER_REJECTED
     else:

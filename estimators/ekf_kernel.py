@@ -22,6 +22,8 @@ ACCELEROMETER_REJECTED = int(Status.ACCELEROMETER_REJECTED)
 MAGNETOMETER_REJECTED = int(Status.MAGNETOMETER_REJECTED)
 DROWNED = 8.0
 """A sensor is marked as rejected where its noise is this many times what it is at best: it weighs a ninth."""
+SHOCK = 4.0
+"""Accelerations beyond 2 g count as that, in g^2, lest one crash blind the filter for long."""
 OUTLIER = 25.0
 """A heading further off than 5 standard deviations counts as just that far."""
 PATIENCE_S, HASTE = 10.0, 8.0
@@ -164,7 +166,7 @@ def step(
         f = turned(R, force)
         tilt_x, tilt_y, lift = f[1] * c.per_gravity, -f[0] * c.per_gravity, f[2] * c.per_gravity - 1.0
         moved = max(tilt_x * tilt_x + tilt_y * tilt_y + lift * lift - (prior[0] + prior[3]), 0.0)
-        motion += min(c.motion_rate * dt, 1.0) * (moved - motion)
+        motion += min(c.motion_rate * dt, 1.0) * (min(moved, SHOCK) - motion)
         noise_tilt = (c.force + c.force_motion * motion) * per_s
         if c.force_motion * motion > DROWNED * c.force:
             flags |= ACCELEROMETER_REJECTED
