@@ -160,7 +160,7 @@ def _write_mcap(path: Path, columns: list[Columns], payloads: list[tuple[int, in
             ids.append(writer.register_channel(entry.channel.topic, "cdr", schema))
         for number, time_ns, data in payloads:
             writer.add_message(ids[number], time_ns, data, time_ns)
-        writer.finish()
+        writer.finish()  # type: ignore[no-untyped-call]
 
 
 def _write_foxglove(path: Path, columns: list[Columns], payloads: list[tuple[int, int, bytes]]) -> None:

@@ -46,7 +46,8 @@ class ChunkWriter:
             self.contents.schemas[outlet.schema.id] = outlet.schema
             self.contents.channels[outlet.channel.id] = outlet.channel
             if len(outlet.rows.time_ns):
-                self.contents.counts[outlet.channel.id] = len(outlet.rows.time_ns)
+                before = self.contents.counts.get(outlet.channel.id, 0)
+                self.contents.counts[outlet.channel.id] = before + len(outlet.rows.time_ns)
         slab_size = min(LARGEST_SLAB, max(SLAB_SIZE, len(outlets) * SLAB_PER_CHANNEL))
         slab = np.zeros(0, np.uint8)
         first = 0

@@ -16,7 +16,6 @@ from .records import (
     SchemaRecord,
     Statistics,
     metadata_record,
-    prefixed,
     record,
     text,
 )
@@ -104,13 +103,3 @@ def write_end(sink: Sink, contents: Contents) -> None:
             at += len(packed)
     body = b"".join(summary + offsets) + struct.pack("<BQQQ", Op.FOOTER, 20, start, at)
     sink.write(body + struct.pack("<I", crc32(body)) + MAGIC)
-
-
-__all__ = [
-    "Contents",
-    "prefixed",
-    "write_attachment",
-    "write_end",
-    "write_header",
-    "write_metadata",
-]

@@ -2,10 +2,6 @@
 
 from isal import isal_zlib
 
-from ..schemas.columns import Table
-
-Buffer = bytes | bytearray | memoryview | Table
-
 
 def crc32(data: object, value: int = 0) -> int:
     """The checksum of ``data`` (any buffer), going on from ``value``."""

@@ -1,7 +1,8 @@
 """`write`: columns to a new MCAP file."""
 
 import os
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+import re
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +20,7 @@ from .sink import replacing
 PROFILE = "ros2"
 LIBRARY = "attlog"
 COMPRESSIONS: Mapping[str, str] = {"zstd": "zstd", "lz4": "lz4", "none": ""}
+_DERIVED = re.compile(r"(/vehicle\d+)?/(estimate|error|findings|annotations|tf|bodies)(/|$)")
 QOS_KEY = "offered_qos_profiles"
 _FOREVER = "\n    sec: 9223372036\n    nsec: 854775807\n"
 QOS = (
@@ -29,6 +31,11 @@ QOS = (
 """What rosbag2 records of an ordinary publisher (keep last, reliable, volatile); ``ros2 bag play`` asks for it."""
 
 
+def is_derived(topic: str) -> bool:
+    """Whether estimating, analyzing or annotating makes the topic, and makes it again."""
+    return _DERIVED.match(topic) is not None
+
+
 def write(
     path: str | os.PathLike[str],
     columns: Iterable[Columns],
@@ -37,18 +44,20 @@ def write(
     attachments: Sequence[Attachment] = (),
     compression: str = "zstd",
     force: bool = False,
+    apart: Callable[[str], bool] = is_derived,
 ) -> None:
     """Write channels to ``path``, interleaved by time, with profile ros2, every index and every CRC.
 
-    ``compression``: zstd, lz4 or none. The file appears whole or not at all; StorageError where it exists (unless
-    ``force``) or the disk refuses, UsageError for two channels of one topic.
+    ``compression``: zstd, lz4 or none. The topics ``apart`` get chunks of their own, behind the others, so that
+    `annotate` can replace them without touching the rest. The file appears whole or not at all; StorageError where it
+    exists (unless ``force``) or the disk refuses, UsageError for two channels of one topic.
     """
     channels = list(columns)
     name = compression_name(compression)
     with replacing(Path(path), force) as sink:
         contents = Contents()
         write_header(sink, PROFILE, LIBRARY)
-        add_channels(ChunkWriter(sink, contents, name, codecs()[name]), channels)
+        add_channels(ChunkWriter(sink, contents, name, codecs()[name]), channels, apart=apart)
         for item in attachments:
             write_attachment(sink, contents, item)
         for title, entries in (metadata or {}).items():
@@ -68,12 +77,15 @@ def add_channels(
     columns: Sequence[Columns],
     channel_ids: Collection[int] = (),
     schema_ids: Collection[int] = (),
+    apart: Callable[[str], bool] | None = None,
 ) -> None:
     """Write the channels' messages as chunks, under other ids than the given ones; equal schemas are used again."""
     check(columns)
     outlets = _outlets(columns, writer.contents, free_ids(channel_ids), free_ids(schema_ids))
     write_idle(writer.sink, outlets)
-    writer.write(outlets, schedule([outlet.rows for outlet in outlets]))
+    later = {outlet.channel.id for outlet in outlets if apart is not None and apart(outlet.channel.topic)}
+    for group in ([o for o in outlets if o.channel.id not in later], [o for o in outlets if o.channel.id in later]):
+        writer.write(group, schedule([outlet.rows for outlet in group]))
 
 
 def check(columns: Sequence[Columns]) -> None:

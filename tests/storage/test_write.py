@@ -148,7 +148,7 @@ def test_foxglove_reads_every_channel(every_type: Any, readcheck: Path, compress
 def test_messages_of_all_channels_are_interleaved_by_time(
     log_path: Path, imu: Columns, mag: Columns, notes: Columns
 ) -> None:
-    storage.write(log_path, [mag, notes, imu])
+    storage.write(log_path, [mag, notes, imu], apart=lambda topic: False)
     with log_path.open("rb") as file:
         reader = make_reader(file, validate_crcs=True)
         summary = reader.get_summary()
@@ -159,6 +159,16 @@ def test_messages_of_all_channels_are_interleaved_by_time(
     sizes = [chunk.uncompressed_size for chunk in summary.chunk_indexes]
     assert len(sizes) > 1
     assert all(2**20 <= size < 2**20 + 10_000 for size in sizes[:-1])
+
+
+def test_derived_channels_have_chunks_of_their_own(log_path: Path, imu: Columns, mag: Columns, notes: Columns) -> None:
+    storage.write(log_path, [notes, imu, mag])
+    with storage.open(log_path) as log:
+        ids = {topic: info.id for topic, info in log.topics.items()}
+        kinds = [set(chunk.message_indexes) for chunk in log.index.chunks]
+        assert (log["/annotations"].data["msg"] == notes.data["msg"]).all()
+    assert kinds[-1] == {ids["/annotations"]}
+    assert all(kind == {ids["/imu0/data_raw"], ids["/mag0/field"]} for kind in kinds[:-1])
 
 
 def test_equal_times_keep_the_order_of_the_channels(log_path: Path, imu: Columns) -> None:
