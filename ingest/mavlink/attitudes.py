@@ -12,7 +12,7 @@ from ...schemas.finding import Finding, Kind, Severity
 from ...schemas.recording import Floats
 from ...schemas.unified import attitude_columns
 from .frames import Frames, Group
-from .times import ARRIVAL, Timeline
+from .times import Timeline
 from .vehicles import Vehicle, sent_by
 
 
@@ -125,15 +125,13 @@ def _made(
         times, orientation, square = times[keep], orientation[keep], square[keep]
     if len(times) == 0:
         return None
-    if group.definition.own_time[0] == 0:
-        about["stamped_by"] = ARRIVAL
     return attitude_columns(
         f"{vehicle.prefix}/{place}/attitude",
         times,
         orientation / np.sqrt(square)[:, np.newaxis],
         child_frame_id=f"{vehicle.prefix}/{place.replace('/', '_')}".lstrip("/"),
         source=group.name,
-        metadata={"system": str(vehicle.system), **about},
+        metadata={"system": str(vehicle.system), **line.stamped_by(group), **about},
     )
 
 

@@ -20,6 +20,7 @@ STEP_US: Final = 1_000_000
 WINDOW_US: Final = 10_000_000
 WINDOW_MOST: Final = 2000
 ENOUGH: Final = 20
+FEW: Final = 3
 WRAP_SLACK_US: Final = 60_000_000
 BINS: Final = 64
 SPAN_US: Final = 60_000_000
@@ -103,10 +104,12 @@ def _stamped_breaks(seen: Observations) -> list[Break]:
         before = _window(seen.stamp, int(k), start, -1)
         after = _window(seen.stamp, int(k) + 1, len(seen), 1)
         change = offset[after].min() - offset[before].min()
+        fell = seen.own[after].min() < seen.own[before].max() - STEP_US
         least = STEP_US if _lasts(seen.stamp[after]) and _lasts(seen.stamp[before]) else WINDOW_US
         if abs(change) <= least or abs(jump[k]) < 0.5 * abs(change):
             continue
-        fell = seen.own[after].min() < seen.own[before].max() - STEP_US
+        if len(seen.own[after]) < FEW or (len(seen.own[before]) < FEW and not fell):
+            continue  # one stray message at an end of the log
         found.append(Break(int(k) + 1, REBOOT if fell else STEP))
         start = int(k) + 1
     return found

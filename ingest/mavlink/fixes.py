@@ -33,7 +33,8 @@ def channels(frames: Frames, line: Timeline, vehicle: Vehicle) -> Iterator[Colum
             continue
         rows = group.rows if keep.all() else group.rows[keep]
         ellipsoid = bool(rows["alt_ellipsoid"].any())
-        about = {"system": str(vehicle.system), "altitude": "ellipsoid" if ellipsoid else "mean sea level"}
+        about = {"system": str(vehicle.system), **line.stamped_by(group)}
+        about["altitude"] = "ellipsoid" if ellipsoid else "mean sea level"
         yield fix_columns(
             f"{vehicle.prefix}/gnss{instance}/fix",
             line.of(group)[keep],

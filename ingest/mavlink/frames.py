@@ -15,13 +15,15 @@ WINDOW: Final = 1 << 16
 DAY_US: Final = 86_400_000_000
 SLACK_US: Final = 2_000_000
 SHORT_RUN: Final = 3
+USUAL_RECORD: Final = 28
+ROOM: Final = 1024
 ROUNDS: Final = 4
 
 
 @dataclass(frozen=True, eq=False)
 class Damage:
-    """What of the bytes is no frame: ``runs`` as `scan_kernel.scan` gives them, bytes of a torn last record, and how many
-    stamps had to be made up because they were lost or impossible.
+    """What of the bytes is no frame: ``runs`` as `scan_kernel.scan` gives them, bytes of a torn last record, and how
+    many stamps had to be made up because they were lost or impossible.
     """
 
     runs: Ints
@@ -42,8 +44,9 @@ class Damage:
 
 @dataclass(frozen=True, eq=False)
 class Group:
-    """All messages of one kind from one component: ``rows`` (n,) in the order of the log."""
+    """All messages of one kind from one component, the ``number``-th: ``rows`` (n,) in the order of the log."""
 
+    number: int
     definition: Definition
     system: int
     component: int
@@ -99,10 +102,20 @@ def find(data: Bytes, dialect: Dialect) -> Frames:
 def _scan(
     data: Bytes, crc_extra: NDArray[np.int16], stamped: bool, reference: int
 ) -> tuple[Ints, NDArray[np.uint8], Ints]:
-    most = len(data) // scan_kernel.SHORTEST + 1
-    found, kinds, runs = np.empty((3, most), np.int64), np.empty(most, np.uint8), np.empty((most + 1, 4), np.int64)
-    count, bad = scan_kernel.scan(data, crc_extra, stamped, reference, found, kinds, runs)
-    return found[:, :count], kinds[:count], runs[:bad]
+    """What `scan_kernel.scan` finds, in tables that grow where frames are short or much is broken."""
+    parts: list[tuple[Ints, NDArray[np.uint8], Ints]] = []
+    most = len(data) // USUAL_RECORD + ROOM
+    at: Integer = 0
+    last: Integer = reference
+    while at < len(data):
+        found, kinds, runs = np.empty((3, most), np.int64), np.empty(most, np.uint8), np.empty((most, 4), np.int64)
+        count, bad, at, last = scan_kernel.scan(data, int(at), crc_extra, stamped, int(last), found, kinds, runs)
+        parts.append((found[:, :count], kinds[:count], runs[:bad]))
+    if len(parts) == 1:
+        return parts[0]
+    empty = np.empty((3, 0), np.int64), np.empty(0, np.uint8), np.empty((0, 4), np.int64)
+    founds, kinds_, runs_ = zip(empty, *parts, strict=True)
+    return np.concatenate(founds, axis=1), np.concatenate(kinds_), np.concatenate(runs_)
 
 
 def _classify(key_of_frame: Ints) -> tuple[NDArray[np.int32], Ints, Ints]:
@@ -204,6 +217,7 @@ def _layout(dialect: Dialect, keys: Ints, counts: Ints) -> tuple[tuple[Group, ..
     out = np.zeros(int(starts[-1]), np.uint64)
     groups = tuple(
         Group(
+            i,
             definition,
             int(key) >> 8 & 0xFF,
             int(key) & 0xFF,

@@ -68,7 +68,7 @@ def channels(
             if scales is None:
                 findings.append(_refusal(frames, line, vehicle, group, required))
                 continue
-            found = _of(group.rows, line.of(group), vehicle, group.name, number, chosen, scales)
+            found = _of(group, line, vehicle, number, chosen, scales)
             columns += [c for c in found if c.channel.topic not in taken]
     return columns, findings
 
@@ -103,20 +103,20 @@ def _instances(group: Group, instance: int) -> Iterator[tuple[int, NDArray[np.bo
 
 
 def _of(
-    rows: "NDArray[np.void]",
-    times: Time,
+    group: Group,
+    line: Timeline,
     vehicle: Vehicle,
-    name: str,
     number: int,
     chosen: NDArray[np.bool_] | None,
     scales: Scales,
 ) -> Iterator[Columns]:
     """The channels of one IMU, without those that its message always leaves zero."""
+    rows, times = group.rows, line.of(group)
     if chosen is not None:
         rows, times = rows[chosen], times[chosen]
     about: dict[str, Any] = {
-        "source": name,
-        "metadata": {"system": str(vehicle.system)},
+        "source": group.name,
+        "metadata": {"system": str(vehicle.system), **line.stamped_by(group)},
         "frame_id": f"{vehicle.prefix}/base_link".lstrip("/"),
     }
     force, rate, mag = (_vectors(rows, kind) for kind in ("acc", "gyro", "mag"))

@@ -7,18 +7,15 @@ from numpy.typing import NDArray
 
 from ...schemas.columns import Channel, Columns, Table
 from .frames import Frames, Group
-from .times import ARRIVAL, Timeline
+from .times import Timeline
 
 
 def channels(frames: Frames, line: Timeline) -> Iterator[Columns]:
     """One channel per message and component; values as stored."""
-    for number, group in enumerate(frames.groups):
+    for group in frames.groups:
         rows = with_clean_texts(group)
         about = {"source": group.name, "system": str(group.system), "component": str(group.component)}
-        if line.by_arrival[number, 0] == len(group):
-            about["stamped_by"] = ARRIVAL
-        elif line.by_arrival[number, 0]:
-            about["stamped_by"] = f"own time; {line.by_arrival[number, 0]} of {len(group)} by {ARRIVAL}"
+        about |= line.stamped_by(group)
         topic = f"/mavlink/{group.system}/{group.component}/{group.name}"
         yield Columns(Channel(topic, group.definition.type, about), line.of(group), rows)
 

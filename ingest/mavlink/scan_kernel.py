@@ -224,10 +224,18 @@ def next_right(
 
 @kernel
 def scan(
-    data: Bytes, crc_extra: NDArray[np.int16], stamped: bool, last: Integer, found_frames: Ints, kinds: Bytes, bad: Ints
-) -> tuple[Integer, Integer]:
-    """Find all frames; how many there are, and how many runs of bad bytes.
+    data: Bytes,
+    at: Integer,
+    crc_extra: NDArray[np.int16],
+    stamped: bool,
+    last: Integer,
+    found_frames: Ints,
+    kinds: Bytes,
+    bad: Ints,
+) -> tuple[Integer, Integer, Integer, Integer]:
+    """Find the frames from ``at`` on until the data end or the tables are full.
 
+    Returns how many frames and how many runs of bad bytes there are, where the scan ended, and the last right stamp.
     ``last``: a stamp that is known to be right, for telemetry logs. Filled are, per frame, ``found_frames`` (3, n):
     place, stamp as it stands in the log (us, NO_STAMP where there is none), key (`key_of`); ``kinds`` (n,): where the
     stamp comes from (LOOSE, IN_PLACE, OF_BAD_FRAME); ``bad`` (r, 4): a run's start, stop, message id of a header there
@@ -236,9 +244,8 @@ def scan(
     size = len(data)
     places, stamps, keys = found_frames
     count, runs = 0, 0
-    at: Integer = 0
-    before: Integer = NO_STAMP
-    while at < size:
+    before: Integer = last
+    while at < size and count < len(places) and runs < len(bad):
         head = at + STAMP if stamped else at
         length, key = known_frame(data, head, crc_extra)
         if length == 0:
@@ -271,4 +278,4 @@ def scan(
             bad[runs, 3] = extra_in(data, start)
             runs += 1
         at = found + length
-    return count, runs
+    return count, runs, at, last

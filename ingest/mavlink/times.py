@@ -37,6 +37,13 @@ class Timeline:
         """The times of a group's messages."""
         return self.times_ns[group.first_row : group.first_row + len(group)]
 
+    def stamped_by(self, group: Group) -> dict[str, str]:
+        """The channel metadata ``stamped_by`` of messages that took their arrival's time."""
+        by_arrival = int(self.by_arrival[group.number, 0])
+        if by_arrival == len(group):
+            return {"stamped_by": ARRIVAL}
+        return {"stamped_by": f"own time; {by_arrival} of {len(group)} by {ARRIVAL}"} if by_arrival else {}
+
     def clock_of(self, vehicle: Vehicle) -> int:
         """The number of the vehicle's clock, -1 where it has none: its autopilot's, else its first."""
         own = [i for i, c in enumerate(self.clocks) if c.system == vehicle.system]

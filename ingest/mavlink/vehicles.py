@@ -16,6 +16,8 @@ NO_AUTOPILOT: Final = 8
 IMU_MESSAGES: Final = ("HIGHRES_IMU", "RAW_IMU", "SCALED_IMU", "SCALED_IMU2", "SCALED_IMU3")
 # Further messages whose sender is a vehicle
 VEHICLE_MESSAGES: Final = ("ATTITUDE", "ATTITUDE_QUATERNION", "AHRS2", "SIMSTATE", "SIM_STATE", "HIL_STATE_QUATERNION")
+# Messages that only ArduPilots send
+ARDUPILOT_MESSAGES: Final = ("AHRS", "HWSTATUS", "MEMINFO", "EKF_STATUS_REPORT", "MCU_STATUS")
 
 
 @dataclass(frozen=True)
@@ -66,7 +68,8 @@ def _vehicle(frames: Frames, system: int) -> Vehicle | None:
         return Vehicle(system, group.component, autopilot, kind, samples)
     if not speaks:
         return None
-    return Vehicle(system, max(speaks, key=len).component, beats[0][1] if beats else -1, -1, samples)
+    autopilot = beats[0][1] if beats else ARDUPILOT if frames.of(*ARDUPILOT_MESSAGES, system=system) else -1
+    return Vehicle(system, max(speaks, key=len).component, autopilot, -1, samples)
 
 
 def _most_common(heartbeats: Group) -> tuple[int, int]:

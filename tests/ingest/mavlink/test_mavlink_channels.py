@@ -53,6 +53,23 @@ def test_counts_need_a_sensor(tape: Any, messages: Any) -> None:
     assert vectors(mag.data, "magnetic_field")[0] == pytest.approx(np.array([-50, -200, 400]) * 0.15e-6)
 
 
+def test_an_ardupilot_without_heartbeat(tape: Any, messages: Any) -> None:
+    """Only ArduPilots send HWSTATUS."""
+    log = tape()
+    log.send(0, messages.MAVLink_hwstatus_message(5000, 0))
+    log.send(1, raw_imu(messages))
+    imu = tape.channel(log.read(), "/imu0/data_raw")
+    assert vectors(imu.data, "linear_acceleration")[0, 2] == pytest.approx(GRAVITY)
+
+
+def test_own_times_that_are_not_set(log: Any, messages: Any, tape: Any) -> None:
+    log.send(1, messages.MAVLink_attitude_message(1000, 0, 0, 0, 0, 0, 0))
+    log.send(2, raw_imu(messages, 0))
+    imu = tape.channel(log.read(), "/imu0/data_raw")
+    assert imu.channel.metadata["stamped_by"] == "arrival"
+    assert (imu.time_ns[0] // 1000 - log.start_us) / 1e6 == pytest.approx(2)
+
+
 def test_scaled_imu_stands_in_for_counts(tape: Any, messages: Any) -> None:
     log = tape()
     log.send(1, raw_imu(messages))

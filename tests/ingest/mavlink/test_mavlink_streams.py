@@ -133,6 +133,16 @@ def test_a_bad_length_swallows_nothing(tape: Any, messages: Any) -> None:
     assert complete.bytes_skipped == len(frame)
 
 
+def test_short_frames_in_great_number(tape: Any, messages: Any) -> None:
+    """More frames and more bad runs than the tables are made for at first."""
+    log = tape(stamped=False)
+    for number in range(6000):
+        log.send(0, messages.MAVLink_mission_current_message(number % 100), version=1)
+        log.data += b"\x00" * (number % 3 == 0)
+    complete = log.read().completeness
+    assert (complete.messages, complete.bytes_skipped, complete.dropped) == (6000, 2000, {"no frame": 2000})
+
+
 def test_unknown_messages_are_kept_raw(tape: Any, messages: Any) -> None:
     log = tape()
     for number in range(10):

@@ -171,6 +171,34 @@ def test_a_stamp_parted_from_its_frame(tape: Any, messages: Any) -> None:
     assert (complete.messages, complete.bytes_skipped, sum(complete.dropped.values())) == (50, 20, 1)
 
 
+def test_stamps_that_are_no_utc(tape: Any, messages: Any) -> None:
+    """A logger without a clock: times count from the vehicle's boot, and are of one piece for all messages."""
+    log = tape(start_us=3_000_000)
+    _, arrival = run(log, messages, 100_000, 0)
+    log.send(arrival, heartbeat(messages))
+    run(log, messages, 7_000, arrival + 20)
+    ingested = log.read()
+    times = tape.channel(ingested, ATTITUDE).time_ns / 1e9
+    assert times[:300] == pytest.approx(100 + 0.1 * np.arange(300))
+    assert times[300:] == pytest.approx(130.9 + 0.1 * np.arange(300))
+    assert tape.channel(ingested, HEARTBEAT).time_ns / 1e9 == pytest.approx([130.0])
+    assert ingested.metadata["mavlink"]["utc_from"] == "since boot"
+
+
+def test_a_second_component_with_a_clock_of_its_own(tape: Any, messages: Any) -> None:
+    """A gimbal that booted later, and whose clock says nothing of UTC, is put on the vehicle's time."""
+    log = tape()
+    for number in range(300):
+        log.send(0.1 * number, attitude(messages, 50_000 + 100 * number))
+        log.send(0.1 * number + 0.03, attitude(messages, 2_000 + 100 * number), component=154)
+    log.send(30, messages.MAVLink_system_time_message(log.start_us + 130_000_000, 80_000))
+    ingested = log.read()
+    assert since_start(log, tape.channel(ingested, ATTITUDE).time_ns) == pytest.approx(100 + 0.1 * np.arange(300))
+    gimbal = tape.channel(ingested, "/mavlink/1/154/ATTITUDE")
+    assert since_start(log, gimbal.time_ns) == pytest.approx(100.03 + 0.1 * np.arange(300))
+    assert [s.vehicle for s in ingested.segments] == ["1"]
+
+
 def test_raw_streams_count_from_boot(tape: Any, messages: Any) -> None:
     log = tape(stamped=False)
     run(log, messages, 100_000, 0)
