@@ -11,16 +11,13 @@ import numpy as np
 
 from . import clocks
 from .clocks import REBOOT, START, STEP, WRAP, Break, Line, Observations
-from .frames import Frames, Group
-from .rows_kernel import BOOT_MS, UNIX_US, WRAP_US
-from .scan_kernel import Ints
+from .frames import Frames
+from .rows_kernel import WRAP_US
+from .senders import UTC_FROM_US, UTC_TO_US, Sender, senders
 
-# Messages without time_boot_ms whose time is that of sending; others (a GPS fix) may be old.
-PROMPT: Final = frozenset({"RAW_IMU", "HIGHRES_IMU"})
-UTC_FROM_US: Final = 946_684_800_000_000
-UTC_TO_US: Final = 4_102_444_800_000_000
 AFTER_US: Final = 1_000_000
 MOST_PIECES: Final = 8
+APART: Final = 20
 
 SYSTEM_TIME: Final = "SYSTEM_TIME"
 OWN: Final = "own time"
@@ -71,73 +68,46 @@ class Clock:
 
 def build(frames: Frames, main: tuple[int, int] | None) -> list[Clock]:
     """All clocks of a log, resolved; the first is that of ``main`` (system, component), or the one seen most."""
-    clocks_ = [_clock(frames, sender, seen) for sender, seen in _observations(frames)]
-    clocks_ = [c for c in clocks_ if c.pieces]
-    clocks_.sort(key=lambda c: ((c.system, c.component) != main, c.unix, -c.seen))
-    return _resolved(frames, clocks_)
+    found = [clock for clock in (_clock(sender, frames.stamped) for sender in senders(frames)) if clock.pieces]
+    found.sort(key=lambda c: ((c.system, c.component) != main, c.unix, -c.seen))
+    return _resolved(frames, found)
 
 
-def prompt(group: Group) -> bool:
-    """Whether the message's own time is that of its sending."""
-    return group.definition.own_time[0] == BOOT_MS or group.name in PROMPT
-
-
-def _observations(frames: Frames) -> list[tuple[tuple[int, int, bool], Observations]]:
-    """Per sender and kind of time its prompt messages' own times; all its own times where it has no prompt message."""
-    timed = [g.definition.own_time[0] > 0 for g in frames.groups]
-    with_prompt = {(g.system, g.component) for g in frames.groups if prompt(g)}
-    use = [
-        t and (prompt(g) or (g.system, g.component) not in with_prompt)
-        for t, g in zip(timed, frames.groups, strict=True)
-    ]
-    sender = np.array(
-        [g.system << 9 | g.component << 1 if u else -1 for u, g in zip(use, frames.groups, strict=True)], np.int32
-    )
-    key = sender[frames.groups_of]
-    index = np.flatnonzero((key >= 0) & (frames.own_us >= 0))
-    if len(index) == 0:
-        return []
-    kind = (key[index] | (frames.own_us[index] >= UNIX_US)).astype(np.int32)
-    if kind.min() != kind.max():
-        order = np.argsort(kind, kind="stable")
-        index, kind = index[order], kind[order]
-    firsts = np.flatnonzero(np.diff(kind, prepend=-1))
-    result = []
-    for start, part in zip(firsts, np.split(index, firsts[1:]), strict=True):
-        number = int(kind[start])
-        seen = Observations(part, frames.stamps_us[part], frames.own_us[part])
-        result.append(((number >> 9, number >> 1 & 0xFF, bool(number & 1)), seen))
-    return result
-
-
-def _clock(frames: Frames, sender: tuple[int, int, bool], raw: Observations) -> Clock:
-    system, component, unix = sender
-    seen, wraps = (raw, np.zeros(len(raw), np.int64)) if unix else clocks.unwrap(raw, frames.stamped)
-    pair_frames, pair_own, pair_utc = (np.empty(0, np.int64),) * 3 if unix else _pairs(frames, system, component)
-    pair_own = pair_own + WRAP_US * wraps[np.clip(np.searchsorted(seen.frame, pair_frames), 0, len(seen) - 1)]
-    found = clocks.breaks(seen, wraps, frames.stamped)
+def _clock(sender: Sender, stamped: bool) -> Clock:
+    seen = sender.seen
+    found = _breaks(sender, stamped)
     if len(found) > max(MOST_PIECES, len(seen) // 4):  # what starts anew with every other message is no clock
-        return Clock(system, component, unix, 0, ())
-    for at in clocks.utc_steps(pair_own, pair_utc):
-        place = int(np.searchsorted(seen.frame, pair_frames[at]))
-        if all(abs(place - b.at) > 20 for b in found) and 0 < place < len(seen):
-            found.append(Break(place, STEP, sets_utc=True))
-    found.sort(key=lambda b: b.at)
+        return Clock(sender.system, sender.component, sender.unix, len(seen), ())
     stamp_edges = [b.at for b in found if b.reason in (REBOOT, STEP) and not b.sets_utc]
     utc_edges = [b.at for b in found if b.reason == REBOOT or b.sets_utc]
     pieces = []
     for start, stop, reason in _stretches(found, len(seen)):
-        low, high = _around(stamp_edges, start, len(seen))
-        arrival = clocks.envelope(seen.part(low, high)) if frames.stamped else None
-        low, high = _around(utc_edges, start, len(seen))
-        inside = (pair_frames >= seen.frame[low]) & (pair_frames <= seen.frame[high - 1])
-        utc, source = None, ""
-        if unix:
-            utc, source = Line(0, 0), OWN
-        elif inside.any():
-            utc, source = clocks.fit_pairs(pair_own[inside], pair_utc[inside]), SYSTEM_TIME
-        pieces.append(_piece(seen, start, stop, reason, int(wraps[start]) * WRAP_US, arrival, utc, source))
-    return Clock(system, component, unix, len(seen), tuple(pieces))
+        arrival = clocks.envelope(seen.part(*_around(stamp_edges, start, len(seen)))) if stamped else None
+        utc, source = _utc(sender, *_around(utc_edges, start, len(seen)))
+        ahead = int(sender.wraps[start]) * WRAP_US
+        pieces.append(_piece(seen.part(start, stop), reason, ahead, arrival, utc, source))
+    return Clock(sender.system, sender.component, sender.unix, len(seen), tuple(pieces))
+
+
+def _breaks(sender: Sender, stamped: bool) -> list[Break]:
+    """Where pieces begin: reboots, steps, wraps, and where UTC is set anew."""
+    found = clocks.breaks(sender.seen, sender.wraps, stamped)
+    for at in clocks.utc_steps(sender.pairs.own, sender.pairs.utc):
+        place = int(np.searchsorted(sender.seen.frame, sender.pairs.frame[at]))
+        if 0 < place < len(sender.seen) and all(abs(place - b.at) > APART for b in found):
+            found.append(Break(place, STEP, sets_utc=True))
+    return sorted(found, key=lambda b: b.at)
+
+
+def _utc(sender: Sender, low: int, high: int) -> tuple[Line | None, str]:
+    """What the sender itself says of UTC among its observations ``[low, high)``."""
+    if sender.unix:
+        return Line(0, 0), OWN
+    pairs = sender.pairs
+    inside = (pairs.frame >= sender.seen.frame[low]) & (pairs.frame <= sender.seen.frame[high - 1])
+    if not inside.any():
+        return None, ""
+    return clocks.fit_pairs(pairs.own[inside], pairs.utc[inside]), SYSTEM_TIME
 
 
 def _stretches(found: list[Break], size: int) -> list[tuple[int, int, str]]:
@@ -150,31 +120,11 @@ def _around(edges: list[int], at: int, size: int) -> tuple[int, int]:
     return max([0, *(e for e in edges if e <= at)]), min([size, *(e for e in edges if e > at)])
 
 
-def _piece(
-    seen: Observations,
-    start: int,
-    stop: int,
-    reason: str,
-    ahead: int,
-    arrival: Line | None,
-    utc: Line | None,
-    source: str,
-) -> Piece:
+def _piece(seen: Observations, reason: str, ahead: int, arrival: Line | None, utc: Line | None, source: str) -> Piece:
     """``ahead``: what the unwrapped own times are ahead of those in the messages."""
-    own = seen.own[start:stop] - ahead
+    own = seen.own - ahead
     arrival, utc = (line and replace(line, of0=line.of0 - ahead) for line in (arrival, utc))
-    return Piece(int(seen.frame[start]), reason, int(own[0]), int(own.min()), int(own.max()), arrival, utc, source)
-
-
-def _pairs(frames: Frames, system: int, component: int) -> tuple[Ints, Ints, Ints]:
-    """Frame, own time and UTC of the sender's SYSTEM_TIME messages that know UTC."""
-    for number, group in enumerate(frames.groups):
-        if (group.name, group.system, group.component) == ("SYSTEM_TIME", system, component):
-            utc = group.rows["time_unix_usec"]
-            knows = (utc >= UTC_FROM_US) & (utc < UTC_TO_US) & (group.rows["time_boot_ms"] > 0)
-            own = group.rows["time_boot_ms"].astype(np.int64) * 1000
-            return np.flatnonzero(frames.groups_of == number)[knows], own[knows], utc[knows].astype(np.int64)
-    return (np.empty(0, np.int64),) * 3
+    return Piece(int(seen.frame[0]), reason, int(own[0]), int(own.min()), int(own.max()), arrival, utc, source)
 
 
 @dataclass(frozen=True)

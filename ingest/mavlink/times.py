@@ -15,6 +15,7 @@ from .clocks import REBOOT, STEP, WRAP, Line
 from .frames import Frames, Group
 from .pieces import Clock, Piece
 from .scan_kernel import Ints
+from .senders import prompt
 from .vehicles import Vehicle
 
 FOREVER: Final = int(np.iinfo(np.int64).max)
@@ -85,7 +86,7 @@ def _clocks_of(group: Group, clocks: Sequence[Clock], parents: dict[int, int]) -
     component = parents.get(group.system)
     family = [i for i, c in enumerate(clocks) if c.system == group.system]
     parent = min(family, key=lambda i: (clocks[i].component != component, i), default=0 if clocks else -1)
-    return mine.get(False, -1), mine.get(True, -1), parent, int(pieces.prompt(group))
+    return mine.get(False, -1), mine.get(True, -1), parent, int(prompt(group))
 
 
 def _tables(clocks: Sequence[Clock]) -> tuple[Ints, np.ndarray[tuple[int, ...], np.dtype[np.float64]]]:

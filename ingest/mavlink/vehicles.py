@@ -43,7 +43,10 @@ class Vehicle:
 
 
 def find(frames: Frames, options: IngestOptions) -> list[Vehicle]:
-    """All vehicles, the one with the unprefixed topics first; UsageError where the one that was asked for is absent."""
+    """All vehicles, the one with the unprefixed topics first; with ``all``, every one has its prefix.
+
+    UsageError where the vehicle that was asked for is absent.
+    """
     systems = sorted({g.system for g in frames.groups})
     vehicles = [v for v in (_vehicle(frames, system) for system in systems) if v is not None]
     vehicles.sort(key=lambda v: (not v.has_autopilot, -v.imu_samples, v.system))
@@ -54,7 +57,8 @@ def find(frames: Frames, options: IngestOptions) -> list[Vehicle]:
         vehicles.sort(key=lambda v: v.system != wanted)
         if not vehicles or vehicles[0].system != wanted:
             raise UsageError(f"system {wanted} sends neither HEARTBEAT of an autopilot nor IMU nor attitude")
-    return vehicles[:1] + [replace(v, prefix=f"/vehicle{v.system}") for v in vehicles[1:]]
+    plain = [] if wanted == "all" else vehicles[:1]
+    return plain + [replace(v, prefix=f"/vehicle{v.system}") for v in vehicles[len(plain) :]]
 
 
 def _vehicle(frames: Frames, system: int) -> Vehicle | None:
