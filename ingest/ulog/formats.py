@@ -33,7 +33,8 @@ PADDING: Final = "_padding"
 MOST_BYTES: Final = 0xFFFF - 2
 """A message's size has 16 bits, its subscription's number two bytes."""
 
-_FIELD: Final = re.compile(r"(?P<type>[^\s\[\]]+)(?:\[(?P<length>\d{1,5})\])? +(?P<name>\S+)")
+_FIELD: Final = re.compile(r"(?P<type>[^\s\[\]]+)(?:\[(?P<length>\d{1,5})\])? (?P<name>[^ ]+)(?: .*)?", re.DOTALL)
+_UNPRINTABLE: Final = re.compile(r"[^\x21-\x7e]")
 
 
 @dataclass(frozen=True)
@@ -124,10 +125,10 @@ def parse(text: str) -> tuple[str, Fields] | None:
         return None
     fields = []
     for part in filter(None, listed.split(";")):
-        match = _FIELD.fullmatch(part.strip())
+        match = _FIELD.fullmatch(part)
         if match is None:
             return None
-        fields.append((match["type"], int(match["length"] or 0) or None, match["name"]))
+        fields.append((match["type"], int(match["length"] or 0) or None, _UNPRINTABLE.sub("_", match["name"])))
     return (name, tuple(fields)) if fields else None
 
 

@@ -22,9 +22,10 @@ SYNC_MAGIC: Final = np.frombuffer(b"\x2f\x73\x13\x20\x25\x0c\xbb\x12", np.uint8)
 LEAST: Final = np.zeros(256, np.int64)
 """Letter -> the least size of such a message; 0 where there is no such letter."""
 MOST: Final = np.full(256, 0xFFFF, np.int64)
+"""The most that a key or a name of 255 letters allows, and what no text exceeds: damage shall not swallow a log."""
 for _letter, _least in zip("ADFIMPQRSOLCB", (4, 2, 2, 5, 6, 5, 6, 2, 8, 2, 9, 11, 40), strict=True):
     LEAST[ord(_letter)] = _least
-for _letter, _most in (("R", 2), ("S", 8), ("O", 2)):
+for _letter, _most in zip("APQRSOLCB", (258, 264, 265, 2, 8, 2, 8192, 8192, 64), strict=True):
     MOST[ord(_letter)] = _most
 KEY_AT: Final = np.zeros(256, np.int64)
 """Letter -> where in the message the length of its key stands; 0 where it has none."""

@@ -166,3 +166,10 @@ def test_a_messages_bytes_are_the_writers(writer):
     """The tests' own writer, held to the specification by hand."""
     log = bytes(writer(5).format("t:uint8_t a;").data(1, "B", 7))
     assert log[16:] == struct.pack("<HB", 12, ord("F")) + b"t:uint8_t a;" + struct.pack("<HBHB", 3, ord("D"), 1, 7)
+
+
+def test_a_damaged_name_of_a_field_costs_the_name_only(writer, ingest, channels):
+    log = writer().format("t:uint64_t timestamp;int32_t a\x1cb\n;float c d;").add(1, "t").data(1, "Qif", 1, 7, 2.5)
+    columns = channels(ingest(log))["/ulog/t/0"]
+    assert source_names(columns.channel.type) == {"timestamp": "timestamp", "a_b_": "a_b", "c": "c"}
+    assert MessageType.parse(columns.channel.type.name, columns.channel.type.text) == columns.channel.type
