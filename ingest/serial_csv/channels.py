@@ -17,11 +17,11 @@ from ...schemas.passthrough import SourceField, generated_type
 from ...schemas.sensors import SensorProfile
 from ...schemas.unified import attitude_columns, imu_columns, mag_columns
 from . import attitude, scales
+from .arrow import BILLIONTHS
 from .guesses import Guess
 from .layout import Group, Layout
 from .names import split_unit
 from .scales import Floats, Scale, in_body, vectors
-from .table import BILLIONTHS
 from .units import Quantity
 
 Ints = NDArray[np.int64]
@@ -111,7 +111,7 @@ def mag(rows: Rows, layout: Layout) -> Iterator[Columns]:
         values = vectors(rows.columns, group)
         known = rows.scale(group, values)
         good = np.isfinite(values @ np.ones(3))
-        fresh = good & np.concatenate([[True], np.any(values[1:] != values[:-1], axis=1)])
+        fresh = good & _changes([rows.columns[column] for column in group.columns])
         held = 1.0 - int(np.count_nonzero(fresh)) / max(int(np.count_nonzero(good)), 1)
         chosen = fresh if held > HELD else good
         rows.take(group, good)
@@ -122,11 +122,21 @@ def mag(rows: Rows, layout: Layout) -> Iterator[Columns]:
         yield mag_columns(topic, rows.time_ns if whole else rows.time_ns[chosen], field_t, source="csv", metadata=about)
 
 
+def _changes(columns: list[NDArray[Any]]) -> Mask:
+    """Rows (n,) in which any column differs from the row before; the first one does."""
+    changed = np.ones(len(columns[0]), np.bool_)
+    changed[1:] = columns[0][1:] != columns[0][:-1]
+    for column in columns[1:]:
+        changed[1:] |= column[1:] != column[:-1]
+    return changed
+
+
 def attitudes(rows: Rows, layout: Layout, imu0: Columns | None) -> Iterator[Columns]:
     """``/reference/attitude`` of what is declared as the truth, ``/onboard/csv/attitude`` of what the device says."""
-    force = _force(rows, imu0)
+    groups = [*layout.of(Quantity.QUATERNION), *layout.of(Quantity.EULER)]
+    force = _force(rows, imu0) if groups else None
     taken: set[str] = set()
-    for group in (*layout.of(Quantity.QUATERNION), *layout.of(Quantity.EULER)):
+    for group in groups:
         truth = _is_truth(group, rows.options.attitude)
         name = "reference" if truth else _onboard_name(group)
         topic = _topic(rows.options, "attitude", "/reference/attitude" if truth else f"/onboard/{name}/attitude", 0)

@@ -1,13 +1,14 @@
 """Which lines are data, and why the others are not: whole files at once, and only odd lines one by one."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .dialect import COMMENT_MARKS, Dialect
-from .text import Text
+from .text import NEWLINE, RETURN, Text, holds
 
 Ints = NDArray[np.int64]
 Mask = NDArray[np.bool_]
@@ -32,33 +33,56 @@ _HIGH: Final = bytes(range(128, 256))
 _QUOTE: Final = ord('"')
 
 
+@dataclass(frozen=True)
+class Odd:
+    """A line that is no row of the table."""
+
+    number: int
+    reason: str
+    text: bytes
+
+
+def reason_of(line: bytes, dialect: Dialect) -> str:
+    """Why a line is no data, by itself; `DATA` where it may be."""
+    plain = line.strip()
+    if not plain:
+        return BLANK_LINE
+    if any(plain.startswith(mark) for mark in COMMENT_MARKS if mark != dialect.delimiter):
+        return COMMENT
+    words = any(dialect.is_text)
+    if plain.translate(None, _PRINTABLE + (_HIGH if words else b"")) or b"\r" in line.rstrip(b"\r"):
+        return GARBAGE
+    fields = dialect.split(line)
+    if len(fields) == dialect.fields:
+        return DATA if words or not plain.translate(None, _NUMERIC + dialect.delimiter) else TEXT
+    return FIELDS if any(dialect.number(field) and field.strip() for field in fields) else TEXT
+
+
 def classified(text: Text, dialect: Dialect) -> NDArray[np.uint8]:
     """For each line the position of its reason in `REASONS`; 0 is data."""
-    result = np.zeros(len(text), np.uint8)
     words = any(dialect.is_text)
-    result[_per_line(text, np.flatnonzero(_delimits(text, dialect))) + 1 != dialect.fields] = _CODE[FIELDS]
     known = _PRINTABLE + _HIGH if words else _NUMERIC + dialect.delimiter
-    result[_per_line(text, _outside(text, known)) > 0] = _CODE[TEXT]
-    suspects = np.flatnonzero((result != 0) | np.isin(text.data[text.starts], list(b"#%;/")))
+    suspect = _per_line(text, np.flatnonzero(_delimits(text, dialect))) + 1 != dialect.fields
+    suspect |= _per_line(text, _outside(text, known)) > 0
+    suspect |= np.isin(text.data[text.starts], list(b"#%;/")) | _torn(text)
+    result = np.zeros(len(text), np.uint8)
     headers = {text.line(number).strip() for number in dialect.header_lines}
-    for number in suspects.tolist():
-        result[number] = _CODE[_odd(text.line(number).strip(), headers, dialect, REASONS[result[number]])]
+    for number in np.flatnonzero(suspect).tolist():
+        line = text.line(number)
+        result[number] = _CODE[HEADER if line.strip() in headers else reason_of(line, dialect)]
     return result
 
 
-def _odd(line: bytes, headers: set[bytes], dialect: Dialect, reason: str) -> str:
-    """What a line is that is perhaps no data; a device that resets prints its header again."""
-    if not line:
-        return BLANK_LINE
-    if line in headers:
-        return HEADER
-    if any(line.startswith(mark) for mark in COMMENT_MARKS if mark != dialect.delimiter):
-        return COMMENT
-    if line.translate(None, _PRINTABLE):
-        return GARBAGE
-    if reason == FIELDS and not any(dialect.number(field) and field.strip() for field in dialect.split(line)):
-        return TEXT
-    return reason
+def _torn(text: Text) -> Mask:
+    """Lines (n,) with a carriage return in their midst, or with a quote that is not closed."""
+    torn = np.zeros(len(text), np.bool_)
+    if holds(text.data, RETURN):
+        at = np.flatnonzero(text.data == RETURN)
+        inner = at[text.data[at + 1] != NEWLINE]
+        torn |= _per_line(text, inner) > 0
+    if holds(text.data, _QUOTE):
+        torn |= _per_line(text, np.flatnonzero(text.data == _QUOTE)) % 2 == 1
+    return torn
 
 
 def _per_line(text: Text, at: Ints) -> Ints:

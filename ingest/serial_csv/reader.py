@@ -14,11 +14,12 @@ from ...schemas.finding import Finding, Kind, Note, Severity
 from ...schemas.recording import Segment
 from ...schemas.source import NOT_LOST, Completeness, Ingested, IngestOptions, Source
 from . import channels, times
+from .arrival import fitted, rising
 from .channels import Rows, present
 from .clock import RESET, Stamps, stamps
 from .dialect import Dialect, sniff
 from .layout import Layout, guessed, named, with_guess
-from .lines import COMMENT, REASONS, TEXT, classified
+from .lines import Odd
 from .profile import checked
 from .table import Table, parse
 from .text import Bytes, Text, decoded, single_blanks, without_labels, without_monitor_stamps
@@ -36,8 +37,11 @@ SPOKEN: Final = 200
 """So many comments and boot messages become annotations."""
 
 
-def ingest(source: Source, options: IngestOptions) -> Ingested:
-    """Read the file; InputError where it is no table, or where columns, units or clock cannot be told."""
+def ingest(source: Source, options: IngestOptions, line_ns: Ints | None = None) -> Ingested:
+    """Read the file; InputError where it is no table, or where columns, units or clock cannot be told.
+
+    ``line_ns`` (lines,), where they were received live, is when each line arrived: it says UTC, or the time itself.
+    """
     csv = checked(options.csv)
     dialect, text = opened(source)
     layout = named(dialect, csv, source.name)
@@ -46,8 +50,10 @@ def ingest(source: Source, options: IngestOptions) -> Ingested:
         raise InputError(f"{source.name}: has no line of data ({_counts(table.dropped)})")
     if layout is None:
         layout = guessed(table.columns, dialect.names, csv, source.name)
-    table, layout, device, tick = _clocked(table, layout, csv, source.name)
+    table, layout, device, tick = _clocked(text, table, layout, csv, source.name, line_ns)
     stamped = stamps(device, tick)
+    if line_ns is not None:
+        stamped = fitted(stamped, line_ns[table.line])
     rows = Rows(
         table.columns, stamped.time_ns, table.line, source.name, csv, options.sensor or csv.sensor, list(layout.guesses)
     )
@@ -63,7 +69,7 @@ def ingest(source: Source, options: IngestOptions) -> Ingested:
         completeness=_completeness(source, table, rows),
         segments=_segments(stamped),
         findings=(*_guess_findings(rows), *_clock_findings(stamped, made[0].channel.topic), *rows.findings),
-        notes=tuple(_notes(text, dialect, table, stamped.time_ns)),
+        notes=tuple(_notes(table, stamped.time_ns)),
         metadata={"csv": _about(dialect, layout, table, rows, stamped)},
     )
 
@@ -91,10 +97,14 @@ def _channels(rows: Rows, layout: Layout) -> list[Columns]:
     return [columns for columns in made if len(columns)]
 
 
-def _clocked(table: Table, layout: Layout, csv: CsvOptions, source: str) -> tuple[Table, Layout, Ints, int]:
+def _clocked(
+    text: Text, table: Table, layout: Layout, csv: CsvOptions, source: str, line_ns: Ints | None
+) -> tuple[Table, Layout, Ints, int]:
     """The rows that have a time and do not repeat the one before word for word, and their device time."""
     if csv.rate_hz is not None:
         return table, layout, times.at_rate(table, csv.rate_hz), 1
+    if layout.time is None and line_ns is not None:
+        return table, layout, rising(line_ns[table.line]), 1
     if layout.time is None:
         raise InputError(
             f"{source}: no column is a time (columns: {', '.join(layout.names)}); give --rate HZ, or name it"
@@ -109,7 +119,7 @@ def _clocked(table: Table, layout: Layout, csv: CsvOptions, source: str) -> tupl
     keep = ~np.logical_or.reduce(list(dropped.values()))
     if not np.any(keep):
         raise InputError(f"{source}: its column of times holds no number")
-    return _without(table, dropped), layout, ns[keep] if not np.all(keep) else ns, NANOSECONDS.get(unit, 1)
+    return _without(table, dropped, text), layout, ns[keep] if not np.all(keep) else ns, NANOSECONDS.get(unit, 1)
 
 
 def _empty(table: Table, clock: int | None) -> NDArray[np.bool_]:
@@ -133,21 +143,18 @@ def _repeats(table: Table, ns: Ints) -> NDArray[np.bool_]:
     return same
 
 
-def _without(table: Table, reasons: Mapping[str, NDArray[np.bool_]]) -> Table:
-    """The table without the rows that are marked, which are counted."""
-    counts = {reason: int(np.count_nonzero(rows)) for reason, rows in reasons.items() if np.any(rows)}
-    if not counts:
+def _without(table: Table, reasons: Mapping[str, NDArray[np.bool_]], text: Text) -> Table:
+    """The table without the rows that are marked, which become odd lines."""
+    odd = [
+        Odd(number, reason, text.line(number))
+        for reason, rows in reasons.items()
+        for number in table.line[rows].tolist()
+    ]
+    if not odd:
         return table
     keep = ~np.logical_or.reduce(list(reasons.values()))
-    columns = tuple(column[keep] for column in table.columns)
-    sizes = {reason: int(table.row_bytes * count) for reason, count in counts.items()}
-    return replace(
-        table,
-        columns=columns,
-        line=table.line[keep],
-        dropped={**table.dropped, **counts},
-        dropped_bytes={**table.dropped_bytes, **sizes},
-    )
+    every = sorted((*table.odd, *odd), key=lambda line: line.number)
+    return replace(table, columns=tuple(c[keep] for c in table.columns), line=table.line[keep], odd=tuple(every))
 
 
 def _refuse_guesses(rows: Rows, csv: CsvOptions) -> None:
@@ -162,8 +169,7 @@ def _completeness(source: Source, table: Table, rows: Rows) -> Completeness:
     dropped = dict(table.dropped)
     if empty:
         dropped[NO_VALUE] = dropped.get(NO_VALUE, 0) + empty
-    lost = sum(size for reason, size in table.dropped_bytes.items() if reason not in NOT_LOST)
-    lost = min(lost + int(table.row_bytes * empty), source.size)
+    lost = min(table.dropped_bytes(NOT_LOST) + int(table.row_bytes * empty), source.size)
     return Completeness(source.size, source.size - lost, table.lines - sum(dropped.values()), lost, dropped)
 
 
@@ -206,16 +212,12 @@ def _repairs(marked: NDArray[np.bool_], at: Ints, topic: str, what: str) -> Iter
         yield Finding(int(at[first]), int(at[end - 1]), Severity.WARN, Kind.CLOCK_STEP, topic, count, "samples", advice)
 
 
-def _notes(text: Text, dialect: Dialect, table: Table, time_ns: Ints) -> Iterator[Note]:
+def _notes(table: Table, time_ns: Ints) -> Iterator[Note]:
     """What the device said between the numbers: comments and messages, at the time of the next sample."""
-    if not ({COMMENT, TEXT} & table.dropped.keys()):
-        return
-    codes = classified(text, dialect)
-    said = np.flatnonzero(np.isin(codes, [REASONS.index(COMMENT), REASONS.index(TEXT)]))[:SPOKEN]
-    next_row = np.minimum(np.searchsorted(table.line, said), len(time_ns) - 1)
-    for number, row in zip(said.tolist(), next_row.tolist(), strict=True):
-        words = text.line(number).decode("utf-8", "replace").strip()
-        yield Note(int(time_ns[row]), Severity.INFO, FORMAT, words)
+    said = table.said[:SPOKEN]
+    next_row = np.minimum(np.searchsorted(table.line, [line.number for line in said]), len(time_ns) - 1)
+    for line, row in zip(said, next_row.tolist(), strict=True):
+        yield Note(int(time_ns[row]), Severity.INFO, FORMAT, line.text.decode("utf-8", "replace").strip())
 
 
 def _about(dialect: Dialect, layout: Layout, table: Table, rows: Rows, stamped: Stamps) -> dict[str, str]:

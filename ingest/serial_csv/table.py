@@ -1,80 +1,110 @@
-"""The lines of data as columns of numbers, parsed by Arrow, and every other line counted."""
+"""The lines of data as columns of numbers, and every other line counted with its reason."""
 
+from collections import Counter
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.compute as pc
 from numpy.typing import NDArray
-from pyarrow import csv
 
+from . import arrow
 from .dialect import SAMPLE_BYTES, Dialect
-from .lines import DAMAGED, HEADER, NOT_A_NUMBER, REASONS, classified
-from .text import Bytes, Text
+from .lines import COMMENT, DAMAGED, DATA, HEADER, NOT_A_NUMBER, REASONS, TEXT, Odd, classified, reason_of
+from .text import Bytes, Text, count, largest
 
 Ints = NDArray[np.int64]
-Mask = NDArray[np.bool_]
 
-NULLS: Final = ["", " ", "nan", "NaN", "NAN", "ovf", "OVF", "null", "NULL", "None", "N/A"]
-"""What stands for a value that is not there; Arduino prints ovf for a float beyond 4294967040."""
-BLOCK_BYTES: Final = 4 << 20
-_NUMBER: Final = r"^\s*$|(?i)^\s*[-+]?((\d+[.,]?\d*|[.,]\d+)([eE][-+]?\d+)?|nan|inf|ovf|null|none|n/a)\s*$"
-_INTEGER: Final = r"^\s*[-+]?\d{1,19}\s*$"
+MOST_ODD: Final = 0.2
+"""With a larger part of odd lines, all lines are told apart first."""
 
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """``columns`` are (n,) each: float64 (NaN where empty), int64 for an exact clock, object for text. ``line`` (n,) is
-    the number of each row's line; ``damaged`` the numbers of the lines that were samples once; ``dropped`` counts the
-    lines that are no rows by reason, and ``dropped_bytes`` how long they were."""
+    """``columns`` are (n,) each: float64 (NaN where empty), int64 or billionths for an exact clock, object for text.
+
+    ``line`` (n,) is the number of each row's line, of ``lines`` in all; ``odd`` are the lines that are no rows, in
+    order. ``row_bytes`` is the length of a line of data, on average.
+    """
 
     columns: tuple[NDArray[Any], ...]
     line: Ints
     lines: int
-    damaged: Ints
-    dropped: Mapping[str, int]
-    dropped_bytes: Mapping[str, int]
+    odd: tuple[Odd, ...]
     row_bytes: float
-    """Length of a line of data, on average."""
 
     def __len__(self) -> int:
         return len(self.line)
 
+    @property
+    def damaged(self) -> Ints:
+        """Numbers of the lines that were samples once."""
+        return np.array([line.number for line in self.odd if line.reason in DAMAGED], np.int64)
+
+    @property
+    def said(self) -> list[Odd]:
+        """What the device or a person wrote between the numbers."""
+        return [line for line in self.odd if line.reason in (COMMENT, TEXT)]
+
+    @property
+    def dropped(self) -> Mapping[str, int]:
+        """How many lines are no rows, by reason."""
+        return dict(Counter(line.reason for line in self.odd))
+
+    def dropped_bytes(self, harmless: frozenset[str]) -> int:
+        """How long the lines are that are no rows, but for the harmless reasons."""
+        return sum(len(line.text) + 1 for line in self.odd if line.reason not in harmless)
+
 
 def parse(text: Text, dialect: Dialect, exact: int | None) -> Table:
     """All columns of the file; column ``exact`` keeps all its digits."""
-    return _clean(text, dialect, exact) or _careful(text, dialect, exact)
+    return _quick(text, dialect, exact) or _careful(text, dialect, exact)
 
 
-def _clean(text: Text, dialect: Dialect, exact: int | None) -> Table | None:
-    """The fast way, for a file whose every line after the header is data; None for any other."""
-    skip = len(dialect.header_lines)
-    if any(dialect.is_text) or dialect.header_lines != tuple(range(skip)):
+def _quick(text: Text, dialect: Dialect, exact: int | None) -> Table | None:
+    """The whole file at once, and only the lines that Arrow skips one by one; None where a line needs a closer look."""
+    before = _before_data(text.data, dialect)
+    if before is None or largest(text.data) > 0x7E:
         return None
-    lines = int(np.count_nonzero(text.data == 10))
+    data = text.data[sum(len(line.text) + 1 for line in before) :]
+    lines, skipped = count(data, ord("\n")), list[int]()
     try:
-        columns = _numbers(_after(text.data, skip), dialect, exact)
+        table = arrow.numbers(data, dialect, exact, skipped)
     except pa.ArrowInvalid:
         return None
-    if len(columns[0]) + skip != lines:
+    empty = arrow.empty_rows(table)
+    if len(table) + len(skipped) != lines or len(skipped) > MOST_ODD * lines:
         return None
-    dropped = {HEADER: skip} if skip else {}
-    size = len(text.data) - len(_after(text.data, skip))
-    none = np.zeros(0, np.int64)
-    row_bytes = (len(text.data) - size) / max(lines - skip, 1)
-    return Table(columns, np.arange(skip, lines), lines, none, dropped, {HEADER: size} if skip else {}, row_bytes)
+    line = np.delete(np.arange(lines), skipped) if skipped else np.arange(lines)
+    if empty is not None:
+        skipped += line[empty].tolist()
+        table, line = table.filter(pa.array(~empty)), line[~empty]
+    odd = _odd(text, [number + len(before) for number in sorted(skipped)], dialect)
+    if any(one.reason == DATA for one in odd):
+        return None
+    row_bytes = (len(data) - sum(len(one.text) + 1 for one in odd)) / max(len(line), 1)
+    return Table(arrow.arrays(table), line + len(before), lines + len(before), (*before, *odd), row_bytes)
 
 
-def _after(data: Bytes, lines: int) -> Bytes:
-    """The bytes after the first ``lines`` lines, which a dialect's sample holds."""
-    start = 0
-    head = data[:SAMPLE_BYTES].tobytes()
-    for _ in range(lines):
-        start = head.index(b"\n", start) + 1
-    return data[start:]
+def _before_data(data: Bytes, dialect: Dialect) -> list[Odd] | None:
+    """The lines up to the header's last; None where one of them may be data."""
+    count_before = max(dialect.header_lines, default=-1) + 1
+    head = data[:SAMPLE_BYTES].tobytes().split(b"\n")[:count_before]
+    odd = [
+        Odd(number, HEADER if number in dialect.header_lines else reason_of(line, dialect), line)
+        for number, line in enumerate(head)
+    ]
+    return None if any(line.reason == DATA for line in odd) else odd
+
+
+def _odd(text: Text, numbers: list[int], dialect: Dialect) -> list[Odd]:
+    """The lines of these numbers, each with its reason."""
+    if not numbers:
+        return []
+    headers = {text.line(number).strip() for number in dialect.header_lines}
+    lines = ((number, text.line(number)) for number in numbers)
+    return [Odd(n, HEADER if line.strip() in headers else reason_of(line, dialect), line) for n, line in lines]
 
 
 def _careful(text: Text, dialect: Dialect, exact: int | None) -> Table:
@@ -85,110 +115,11 @@ def _careful(text: Text, dialect: Dialect, exact: int | None) -> Table:
     if len(line):
         data = text.only(codes == 0)
         try:
-            columns = _numbers(data, dialect, exact)
+            columns = arrow.arrays(arrow.numbers(data, dialect, exact))
         except pa.ArrowInvalid:
-            columns, good = _checked(data, dialect, exact)
+            columns, good = arrow.checked(data, dialect, exact)
             codes[line[~good]] = REASONS.index(NOT_A_NUMBER)
             line = line[good]
-    return _counted(text, columns, line, codes)
-
-
-def _counted(text: Text, columns: tuple[NDArray[Any], ...], line: Ints, codes: NDArray[np.uint8]) -> Table:
-    counts = np.bincount(codes, minlength=len(REASONS))
-    sizes = np.bincount(codes, weights=text.ends + 1 - text.starts, minlength=len(REASONS))
-    damaged = np.flatnonzero(np.isin(codes, [REASONS.index(reason) for reason in DAMAGED]))
-    dropped = {reason: int(count) for reason, count in zip(REASONS, counts, strict=True) if reason and count}
-    dropped_bytes = {reason: int(sizes[REASONS.index(reason)]) for reason in dropped}
-    row_bytes = float(sizes[0] / max(counts[0], 1))
-    return Table(columns, line, len(text), damaged, dropped, dropped_bytes, row_bytes)
-
-
-def _read(data: Bytes, dialect: Dialect, types: Mapping[str, pa.DataType]) -> pa.Table:
-    return csv.read_csv(
-        _reader(data),
-        read_options=csv.ReadOptions(use_threads=False, block_size=BLOCK_BYTES, column_names=list(types)),
-        parse_options=csv.ParseOptions(
-            delimiter=dialect.delimiter.decode(), quote_char='"' if 34 in data[:65536] else False
-        ),
-        convert_options=csv.ConvertOptions(
-            column_types=dict(types),
-            null_values=NULLS,
-            strings_can_be_null=False,
-            decimal_point=dialect.decimal.decode(),
-            check_utf8=False,
-        ),
-    )
-
-
-def _reader(data: Bytes) -> Any:
-    buffer: Any = np.ascontiguousarray(data)
-    return pa.BufferReader(pa.py_buffer(buffer))
-
-
-def _numbers(data: Bytes, dialect: Dialect, exact: int | None) -> tuple[NDArray[Any], ...]:
-    """All columns by Arrow's own conversion; ArrowInvalid where a value is no number or a line has other fields."""
-    kinds = [pa.binary() if text else pa.float64() for text in dialect.is_text]
-    names = [f"c{column}" for column in range(dialect.fields)]
-    kind = _exact_kind(data, dialect, exact)
-    if exact is not None and kind is not None and not dialect.is_text[exact]:
-        kinds[exact] = kind
-    table = _read(data, dialect, dict(zip(names, kinds, strict=True)))
-    return tuple(_array(table.column(name)) for name in names)
-
-
-def _exact_kind(data: Bytes, dialect: Dialect, exact: int | None) -> Any:
-    """int64 for whole numbers, a decimal for stamps of more digits than a double holds, else None."""
-    if exact is None:
-        return None
-    head = data[:4096].tobytes().split(b"\n")[:-1][:20]
-    fields = [dialect.split(line)[exact].strip() for line in head if len(dialect.split(line)) == dialect.fields]
-    if not fields or any(b"e" in field.lower() or not field for field in fields):
-        return None
-    if all(field.lstrip(b"+-").isdigit() for field in fields):
-        return pa.int64()
-    whole = max(len(field.lstrip(b"+-").split(dialect.decimal)[0]) for field in fields)
-    return pa.decimal128(28, 9) if 8 < whole < 11 else None
-
-
-def _array(column: Any) -> NDArray[Any]:
-    if pa.types.is_decimal(column.type):
-        return _nanoseconds(column)
-    values: NDArray[Any] = column.to_numpy()
-    return values
-
-
-def _nanoseconds(column: Any) -> NDArray[Any]:
-    """Decimals of 9 places as whole billionths: the low eight bytes of each 128-bit number."""
-    chunk: Any = pa.concat_arrays(column.chunks)
-    halves = np.frombuffer(chunk.buffers()[1], "<i8").reshape(-1, 2)[chunk.offset : chunk.offset + len(chunk)]
-    if chunk.null_count or np.any(halves[:, 1] != halves[:, 0] >> 63):
-        return np.asarray(chunk.cast(pa.float64()).to_numpy(zero_copy_only=False))
-    return np.ascontiguousarray(halves[:, 0]).view(BILLIONTHS)
-
-
-BILLIONTHS: Final = np.dtype("<m8[ns]")
-"""How a column of exact decimals is marked: whole billionths of its unit."""
-
-
-def _checked(data: Bytes, dialect: Dialect, exact: int | None) -> tuple[tuple[NDArray[Any], ...], Mask]:
-    """All columns as text first, so that only the rows with something else than a number are lost."""
-    names = [f"c{column}" for column in range(dialect.fields)]
-    table = _read(data, dialect, dict.fromkeys(names, pa.string()))
-    good = np.ones(len(table), np.bool_)
-    for name, is_text in zip(names, dialect.is_text, strict=True):
-        if not is_text:
-            good &= pc.match_substring_regex(table.column(name), _NUMBER).to_numpy()
-    table = table.filter(pa.array(good))
-    kinds = enumerate(zip(names, dialect.is_text, strict=True))
-    return tuple(_converted(table.column(name), dialect, text, i == exact) for i, (name, text) in kinds), good
-
-
-def _converted(column: Any, dialect: Dialect, is_text: bool, exact: bool) -> NDArray[Any]:
-    if is_text:
-        return np.asarray(column.cast(pa.binary()).to_numpy())
-    plain = pc.utf8_trim_whitespace(pc.replace_substring(column, dialect.decimal.decode(), "."))
-    if exact and pc.all(pc.match_substring_regex(plain, _INTEGER)).as_py():
-        with suppress(pa.ArrowInvalid):  # beyond 64 bits
-            return np.asarray(plain.cast(pa.int64()).to_numpy())
-    plain = pc.if_else(pc.is_in(plain, value_set=pa.array(NULLS)), None, plain)
-    return np.asarray(plain.cast(pa.float64()).to_numpy())
+    odd = tuple(Odd(n, REASONS[codes[n]], text.line(n)) for n in np.flatnonzero(codes).tolist())
+    row_bytes = (len(text.data) - sum(len(one.text) + 1 for one in odd)) / max(len(line), 1)
+    return Table(columns, line, len(text), odd, row_bytes)

@@ -2,6 +2,7 @@
 
 import codecs
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Final
@@ -16,6 +17,7 @@ NEWLINE: Final = 10
 RETURN: Final = 13
 TAB: Final = 9
 BLANK: Final = 32
+PART_BYTES: Final = 1 << 18
 LABEL: Final = re.compile(rb"^[ \t]*[A-Za-z_][\w .]*:[ \t]*[-+.\d]")
 MONITOR_STAMP: Final = re.compile(rb"^\d\d:\d\d:\d\d\.\d{3} -> ", re.MULTILINE)
 """What Arduino's serial monitor puts before each line."""
@@ -49,6 +51,26 @@ class Text:
         turns = np.flatnonzero(np.diff(np.concatenate([[False], kept, [False]])))
         runs = (self.data[self.starts[a] : self.ends[b - 1] + 1] for a, b in turns.reshape(-1, 2).tolist())
         return np.concatenate([*runs, self.data[:0]])
+
+
+def count(data: Bytes, byte: int) -> int:
+    """How often a byte occurs."""
+    return sum(int(np.count_nonzero(part == byte)) for part in _parts(data))
+
+
+def holds(data: Bytes, byte: int) -> bool:
+    """Whether a byte occurs."""
+    return any(bool(np.any(part == byte)) for part in _parts(data))
+
+
+def largest(data: Bytes) -> int:
+    """The largest byte."""
+    return max((int(part.max()) for part in _parts(data)), default=0)
+
+
+def _parts(data: Bytes) -> Iterator[Bytes]:
+    """The bytes in pieces that fit into a processor's cache."""
+    return (data[start : start + PART_BYTES] for start in range(0, len(data), PART_BYTES))
 
 
 def decoded(data: Bytes) -> Bytes:

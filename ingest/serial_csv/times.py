@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...schemas.errors import InputError
+from .arrow import BILLIONTHS
 from .guesses import Guess, time_unit
-from .table import BILLIONTHS, Table
+from .table import Table
 from .units import NANOSECONDS
 
 Ints = NDArray[np.int64]
