@@ -5,6 +5,7 @@ tells about the log's stamps; else from those stamps, where they are UTC; else t
 """
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -92,10 +93,13 @@ def _clock(sender: Sender, stamped: bool) -> Clock:
 def _breaks(sender: Sender, stamped: bool) -> list[Break]:
     """Where pieces begin: reboots, steps, wraps, and where UTC is set anew."""
     found = clocks.breaks(sender.seen, sender.wraps, stamped)
-    for at in clocks.utc_steps(sender.pairs.own, sender.pairs.utc):
-        place = int(np.searchsorted(sender.seen.frame, sender.pairs.frame[at]))
-        if 0 < place < len(sender.seen) and all(abs(place - b.at) > APART for b in found):
-            found.append(Break(place, STEP, sets_utc=True))
+    pairs, frames = sender.pairs, sender.seen.frame
+    boots = np.searchsorted(pairs.frame, [frames[b.at] for b in found if b.reason == REBOOT])
+    for low, high in pairwise((0, *boots.tolist(), len(pairs.frame))):
+        for at in low + clocks.utc_steps(pairs.own[low:high], pairs.utc[low:high]):
+            place = int(np.searchsorted(frames, pairs.frame[at]))
+            if 0 < place < len(frames) and all(abs(place - b.at) > APART for b in found):
+                found.append(Break(place, STEP, sets_utc=True))
     return sorted(found, key=lambda b: b.at)
 
 

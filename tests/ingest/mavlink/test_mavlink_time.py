@@ -281,6 +281,20 @@ def test_utc_set_anew_in_flight(tape: Any, messages: Any) -> None:
     assert np.all(np.diff(times) > 0)
 
 
+def test_utc_that_comes_late_after_a_reboot_is_no_step(tape: Any, messages: Any) -> None:
+    """The fix comes 20 s after each start; all of a boot is on the UTC that it brings."""
+    log = tape()
+    for boot in range(2):
+        for number in range(600):
+            own, at = 5000 + 100 * number, 100 * boot + 0.1 * number
+            log.send(at, attitude(messages, own))
+            utc_us = log.start_us + 7_000_000 + round(1e6 * at) if number > 200 else 0
+            log.send(at, messages.MAVLink_system_time_message(utc_us, own))
+    ingested = log.read()
+    assert reasons(ingested) == ["start", "reboot"]
+    assert since_start(log, [s.start_ns for s in ingested.segments]) == pytest.approx([7, 107])
+
+
 def test_segments_never_overlap_in_random_histories(tape: Any, messages: Any) -> None:
     """Reboots and steps of either clock at random; time never runs backward in the order of the log."""
     for seed in range(25):
