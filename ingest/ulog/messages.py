@@ -1,6 +1,7 @@
 """The messages of a scan by what they say: data, texts, parameters, information, dropouts."""
 
 from collections import defaultdict
+from collections.abc import Iterator
 from typing import Final
 
 import numpy as np
@@ -10,8 +11,8 @@ from .kernels import HEADER
 from .log import Log, Said, Topic
 from .scan import Head, Scan
 
-BEGIN_DATA: Final = frozenset(b"ALCD")
-"""Letters that definitions do not have."""
+AFTER_DEFINITIONS: Final = frozenset(b"ALC")
+"""Letters that end the definitions; data do, too."""
 ENTRIES: Final = {ord("I"): False, ord("P"): False, ord("M"): True, ord("Q"): True}
 """Letters of keys with values -> whether a byte stands before the key."""
 LOGGED, TAGGED, DROPOUT = (ord(letter) for letter in "LCO")
@@ -27,27 +28,21 @@ def collected(begin: Head, scanned: Scan) -> Log:
     entries: dict[int, list[Entry]] = defaultdict(list)
     said: list[Said] = []
     dropouts: list[tuple[int, int]] = []
-    unreadable = 0
-    others = scanned.others()
-    places = scanned.places[others]
-    letters = scanned.raw[places + 2].tolist()
-    sizes = (scanned.raw[places].astype(np.int64) | scanned.raw[places + 1].astype(np.int64) << 8).tolist()
-    whole = memoryview(scanned.raw.data)
-    for number, place, letter, size in zip(others.tolist(), places.tolist(), letters, sizes, strict=True):
-        payload = whole[place + HEADER : place + HEADER + size].tobytes()
+    dropped = dict(scanned.reasons)
+    data_begins = min((int(topic.order[0]) for topic in topics), default=scanned.count)
+    for number, letter, payload in _others(scanned):
         if letter in ENTRIES:
             found = entry(payload, number, ENTRIES[letter])
-            if found is None:
-                unreadable += 1
-            else:
+            if found is not None:
                 entries[letter].append(found)
+            else:
+                dropped["unreadable entries"] = dropped.get("unreadable entries", 0) + 1
         elif letter in (LOGGED, TAGGED):
             said.append(_said(payload, number, letter == TAGGED))
         elif letter == DROPOUT:
             dropouts.append((number, int.from_bytes(payload, "little")))
-    begins = (n for n, letter in zip(others.tolist(), letters, strict=True) if letter in BEGIN_DATA)
-    first_data = min((int(topic.order[0]) for topic in topics), default=scanned.count)
-    dropped = dict(scanned.reasons) | ({"unreadable entries": unreadable} if unreadable else {})
+        if letter in AFTER_DEFINITIONS:
+            data_begins = min(data_begins, number)
     return Log(
         version=begin.version,
         start_us=begin.start_us,
@@ -55,7 +50,7 @@ def collected(begin: Head, scanned: Scan) -> Log:
         appended=begin.appended,
         topics=topics,
         count=scanned.count,
-        data_begins=min(next(begins, scanned.count), first_data),
+        data_begins=data_begins,
         said=said,
         parameters=entries[ord("P")],
         defaults=entries[ord("Q")],
@@ -65,6 +60,19 @@ def collected(begin: Head, scanned: Scan) -> Log:
         bytes_skipped=scanned.skipped,
         dropped=dropped,
     )
+
+
+def _others(scanned: Scan) -> Iterator[tuple[int, int, bytes]]:
+    """Number, letter and payload of every message that is not data."""
+    numbers = scanned.others()
+    places = scanned.places[numbers]
+    heads = scanned.raw[places + np.arange(HEADER)[:, np.newaxis]].astype(np.int64)
+    ends = places + HEADER + (heads[0] | heads[1] << 8)
+    whole = memoryview(scanned.raw.data)
+    for number, letter, start, end in zip(
+        numbers.tolist(), heads[2].tolist(), (places + HEADER).tolist(), ends.tolist(), strict=True
+    ):
+        yield number, letter, whole[start:end].tobytes()
 
 
 def _said(payload: bytes, number: int, tagged: bool) -> Said:
