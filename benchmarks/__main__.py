@@ -3,7 +3,7 @@
 import sys
 from importlib import import_module
 
-NAMES = ("storage", "mavlink", "dataflash", "ulog", "estimators", "run")
+NAMES = ("storage", "mavlink", "dataflash", "ulog", "serial_csv", "estimators", "run")
 
 
 def main(names: list[str]) -> int:

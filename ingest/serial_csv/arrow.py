@@ -10,8 +10,8 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 from pyarrow import csv
 
-from .dialect import Dialect
-from .text import Bytes, holds
+from .dialect import SAMPLE_BYTES, Dialect
+from .text import Bytes
 
 Mask = NDArray[np.bool_]
 
@@ -81,7 +81,7 @@ def _read(data: Bytes, dialect: Dialect, kinds: list[pa.DataType], odd: list[int
     types: Mapping[str, pa.DataType] = dict(zip(names, kinds, strict=True))
     parse_options = csv.ParseOptions(
         delimiter=dialect.delimiter.decode(),
-        quote_char='"' if holds(data, _QUOTE) else False,
+        quote_char='"' if np.any(data[:SAMPLE_BYTES] == _QUOTE) else False,
         ignore_empty_lines=odd is None,
         invalid_row_handler=None if odd is None else skip,
     )

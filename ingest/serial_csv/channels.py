@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import PurePath
 from typing import Any, Final
 
@@ -49,7 +50,11 @@ class Rows:
     def __post_init__(self) -> None:
         self.sampled = np.zeros(len(self.time_ns), np.bool_)
         """Rows that gave a message."""
-        self.time_s = (self.time_ns - self.time_ns[0]) * 1e-9
+
+    @cached_property
+    def time_s(self) -> Floats:
+        """Seconds (n,) from the first row on."""
+        return np.asarray((self.time_ns - self.time_ns[0]) * 1e-9)
 
     def found(self, kind: Kind, topic: str, value: float, unit: str, advice: str, where: Mask | None = None) -> None:
         """Note a finding over the rows (n,) that are marked."""
@@ -87,7 +92,7 @@ def imu(rows: Rows, layout: Layout) -> Iterator[Columns]:
         force_scale = rows.scale(accel, force)
         rate_scale = rows.scale(gyro, rate, (force, force_scale.unit))
         force, rate = in_body(force, force_scale, rows.options.axes), in_body(rate, rate_scale, rows.options.axes)
-        good = np.isfinite(force @ np.ones(3) + rate @ np.ones(3))
+        good = _finite(force, rate)
         rows.take(accel, good)
         rows.take(gyro, good)
         topic = _topic(rows.options, "imu", f"/imu{accel.instance}/data_raw", accel.instance)
@@ -96,6 +101,13 @@ def imu(rows: Rows, layout: Layout) -> Iterator[Columns]:
             yield imu_columns(topic, rows.time_ns[good], rate[good], force[good], source="csv", metadata=about)
         else:
             yield imu_columns(topic, rows.time_ns, rate, force, source="csv", metadata=about)
+
+
+def _finite(*vectors: Floats) -> Mask:
+    """Rows (n,) in which all numbers are; a sum tells at once where all are."""
+    if np.isfinite(sum(float(vector.sum()) for vector in vectors)):
+        return np.ones(len(vectors[0]), np.bool_)
+    return np.asarray(np.logical_and.reduce([np.isfinite(vector).all(axis=1) for vector in vectors]))
 
 
 def _both(accel: dict[str, str], gyro: dict[str, str]) -> dict[str, str]:
@@ -110,7 +122,7 @@ def mag(rows: Rows, layout: Layout) -> Iterator[Columns]:
     for group in layout.of(Quantity.MAG):
         values = vectors(rows.columns, group)
         known = rows.scale(group, values)
-        good = np.isfinite(values @ np.ones(3))
+        good = _finite(values)
         fresh = good & _changes([rows.columns[column] for column in group.columns])
         held = 1.0 - int(np.count_nonzero(fresh)) / max(int(np.count_nonzero(good)), 1)
         chosen = fresh if held > HELD else good

@@ -64,7 +64,7 @@ def stamps(device_ns: Ints, tick_ns: int) -> Stamps:
     """Rising stamps of a device's own (n,), n > 0, which were counted in ticks of ``tick_ns`` (wraps: 2^32 ticks)."""
     steps = np.diff(device_ns)
     glitched = np.zeros(len(device_ns), np.bool_)
-    if len(steps) == 0 or (bool(np.all(steps > 0)) and int(steps.max()) < _leap(steps)):
+    if len(steps) == 0 or (int(steps.min()) > 0 and _is_steady(steps)):
         return Stamps(device_ns, (), (0,), glitched, np.zeros(len(device_ns), np.bool_))
     walk = _Walk(device_ns, tick_ns, _interval(steps))
     time_ns = device_ns + np.repeat(walk.offsets, np.diff([*walk.starts, len(device_ns)]))
@@ -82,8 +82,9 @@ def _interval(steps: Ints) -> float:
     return float(np.median(rising)) if len(rising) else float(SECOND)
 
 
-def _leap(steps: Ints) -> float:
-    return max(LEAP_S * SECOND, LEAP_INTERVALS * _interval(steps))
+def _is_steady(steps: Ints) -> bool:
+    longest = int(steps.max())
+    return longest < LEAP_S * SECOND or longest < LEAP_INTERVALS * _interval(steps)
 
 
 @dataclass(eq=False)

@@ -29,8 +29,8 @@ class Scale:
 
 
 def vectors(columns: Sequence[NDArray[Any]], group: Group) -> Floats:
-    """The group's columns as one array (n, k)."""
-    return np.stack([columns[column] for column in group.columns], axis=1).astype(np.float64, copy=False)
+    """The group's columns as one array (n, k), a copy, each column contiguous."""
+    return np.stack([columns[column] for column in group.columns], dtype=np.float64, casting="unsafe").T
 
 
 def in_body(values: Floats, known: Scale, axes: str) -> Floats:

@@ -46,6 +46,8 @@ def device_ns(column: NDArray[Any], unit: str, source: str) -> tuple[Ints, NDArr
 
 
 def _scaled(column: NDArray[Any], size: int) -> tuple[Ints, NDArray[np.bool_]]:
+    if column.dtype.kind == "i" and -MAX_NS // size < int(column.min()) and int(column.max()) < MAX_NS // size:
+        return column.astype(np.int64, copy=False) * size, np.ones(len(column), np.bool_)
     if column.dtype.kind == "i":
         valid = np.abs(column) < MAX_NS // size
         return np.where(valid, column, 0).astype(np.int64) * size, valid
