@@ -77,7 +77,7 @@ def step(
     wx, wy, wz = weight * e[0], weight * e[1], weight * e[2]  # w_mes, times the interval of the sensor it comes from
     if dt_mag > 0.0:
         square = field[0] * field[0] + field[1] * field[1] + field[2] * field[2]
-        if per_usual == 0.0 or c.mag_gate == 0.0:
+        if square > 0.0 and (per_usual == 0.0 or c.mag_gate == 0.0):
             per_usual = 1.0 / math.sqrt(square)
         share = min(0.5 * (square * per_usual * per_usual - 1.0), 1.0)  # of the length, more than usual
         odd = share * share * c.mag_gate

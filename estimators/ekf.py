@@ -148,7 +148,7 @@ def _usual(start: Start) -> tuple[float, float, float]:
     if start.field is None:
         return 0.0, 0.0, 1.0
     x, y, z = start.field
-    return math.hypot(x, y), z, x * x + y * y + z * z
+    return math.hypot(x, y), z, max(x * x + y * y + z * z, 1e-30)
 
 
 def _covariance(start: Start, noise: Noise) -> "Covariance":

@@ -18,6 +18,8 @@ LOW_RATE_NS = 100_100_000
 """Median interval beyond which attitude estimates are not to be trusted: 10 Hz, and 0.1 % for jitter."""
 BRIDGED_INTERVALS = 5.0
 COASTED_INTERVALS = 2.5
+LARGEST = 1e6
+"""Beyond any sensor, in SI units: such samples are damage."""
 TOLD_GAP_S = 0.1
 """Gaps shorter than this, or than five intervals, are nothing to tell."""
 RESTARTED = (Severity.WARN, "no samples: the estimate starts anew behind the gap, with the bias that it had")
@@ -111,8 +113,8 @@ def _imu(recording: Recording, number: int) -> tuple[Times, Floats, Floats, str,
     if not len(time_ns) == len(rate) == len(force):
         raise InputError(f"{topic}: {len(time_ns)} stamps, {len(rate)} rates and {len(force)} forces do not match")
     findings: list[Finding] = []
-    if not (np.isfinite(rate.sum()) and np.isfinite(force.sum())):
-        good = np.isfinite(rate.sum(axis=1)) & np.isfinite(force.sum(axis=1))
+    if not (_within(rate) and _within(force)):
+        good = _usable(rate) & _usable(force)
         findings += _skipped(time_ns, good, topic)
         time_ns, rate, force = time_ns[good], rate[good], force[good]
     if len(time_ns) == 0:
@@ -139,8 +141,8 @@ def _mag(
     if len(field) != len(time_ns):
         raise InputError(f"{topic}: {len(time_ns)} stamps and {len(field)} fields do not match")
     findings: list[Finding] = []
-    if not (np.isfinite(field.sum()) and np.all(field[:, 0])):
-        good = np.isfinite(field.sum(axis=1)) & field.any(axis=1)
+    if not (_within(field) and np.all(field[:, 0])):
+        good = _usable(field) & field.any(axis=1)
         findings += _skipped(time_ns, good, topic)
         time_ns, field = time_ns[good], field[good]
     if not _sorted(time_ns):
@@ -151,8 +153,18 @@ def _mag(
     return time_ns, field, topic, findings
 
 
+def _within(vectors: Floats) -> bool:
+    """Whether all is usable; a NaN compares as False."""
+    return bool(vectors.max(initial=0.0) < LARGEST and vectors.min(initial=0.0) > -LARGEST)
+
+
+def _usable(vectors: Floats) -> NDArray[np.bool_]:
+    """Which vectors are."""
+    return np.asarray((np.abs(vectors) < LARGEST).all(axis=1))
+
+
 def _sorted(time_ns: Times) -> bool:
-    return len(time_ns) < 2 or int(np.diff(time_ns).min()) >= 0
+    return bool(np.all(time_ns[1:] >= time_ns[:-1]))
 
 
 def _vectors(values: Floats, topic: str) -> Floats:
@@ -203,7 +215,7 @@ def _skipped(time_ns: Times, good: NDArray[np.bool_], topic: str) -> list[Findin
     if len(bad) == 0:
         return []
     span = int(time_ns[bad[0]]), int(time_ns[bad[-1]])
-    advice = "not finite, or all zero: these samples are left out"
+    advice = "not finite, beyond any sensor, or a field of zero: these samples are left out"
     return [Finding(*span, Severity.WARN, Kind.SKIPPED, topic, float(len(bad)), "samples", advice)]
 
 

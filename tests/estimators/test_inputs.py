@@ -188,3 +188,22 @@ def test_a_handful_of_samples_is_enough(simulated: Any, name: str, count: int) -
     run = simulated(t=np.arange(count) * 0.01)
     estimate = estimators.estimate(run.recording, name)
     assert run.error_deg(estimate.orientation).max() < 2.0
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_damaged_values_never_escape(simulated: Any, name: str) -> None:
+    rng = np.random.default_rng(8)
+    for _ in range(40):
+        run = simulated(seconds=2.0)
+        imu, mag = run.recording.imu[0], run.recording.mag[0]
+        arrays = [imu.angular_velocity.copy(), imu.specific_force.copy(), mag.field.copy()]
+        for array in arrays:
+            rows = rng.integers(0, len(array), 20)
+            array[rows] *= 10.0 ** rng.integers(-300, 300, 20)[:, None]
+        damaged = dataclasses.replace(
+            run.recording,
+            imu={0: dataclasses.replace(imu, angular_velocity=arrays[0], specific_force=arrays[1])},
+            mag={0: dataclasses.replace(mag, field=arrays[2])},
+        )
+        q = estimators.estimate(damaged, name).orientation
+        np.testing.assert_allclose(np.linalg.norm(q, axis=1), 1.0, atol=1e-9)
