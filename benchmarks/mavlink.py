@@ -3,8 +3,9 @@
 import random
 import struct
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from pymavlink import mavutil
@@ -87,7 +88,7 @@ def messages(chance: random.Random) -> Iterator[dialect.MAVLink_message]:
             yield make(milliseconds, number, angle)
 
 
-MAKE = {
+MAKE: dict[str, Callable[[int, Callable[[], int], Callable[[], float]], Any]] = {
     "HEARTBEAT": lambda t, n, a: dialect.MAVLink_heartbeat_message(2, 3, 81, 0, 3, 3),
     "RAW_IMU": lambda t, n, a: dialect.MAVLink_raw_imu_message(
         1000 * t, n(), n(), n(), n(), n(), n(), n(), n(), n(), 0, 2500

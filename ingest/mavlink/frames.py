@@ -140,7 +140,7 @@ def _split_torn(data: Bytes, runs: Ints) -> tuple[Ints, int]:
         return runs, 0
     start = int(runs[-1, 0])
     torn = len(data) - start
-    begins = data[start] in (scan_kernel.MAGIC_1, scan_kernel.MAGIC_2)
+    begins = data[start] in (scan_kernel.MAGIC_1, scan_kernel.MAGIC_2) and torn < scan_kernel.LONGEST
     return (runs[:-1], torn) if torn <= STAMP or begins else (runs, 0)
 
 

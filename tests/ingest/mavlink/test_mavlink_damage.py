@@ -64,6 +64,15 @@ def test_recognized_behind_garbage(tape: Any, messages: Any) -> None:
     assert (complete.messages, complete.bytes_skipped) == (20, 3000)
 
 
+def test_garbage_at_the_end_is_no_torn_record(tape: Any, messages: Any) -> None:
+    log = tape()
+    for number in range(10):
+        log.send(number, messages.MAVLink_attitude_message(1000 * number + 1, 0, 0, 0, 0, 0, 1))
+    log.data += b"\xfe" * 1000
+    complete = log.read().completeness
+    assert (complete.bytes_skipped, complete.messages) == (1000, 10)
+
+
 def test_every_truncation(tape: Any, messages: Any) -> None:
     """Cut anywhere, the whole frames before the cut are read, and the rest is accounted for."""
     log = tape()
