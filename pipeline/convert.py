@@ -22,6 +22,9 @@ from .recordings import recordings
 from .text import count, moment, seconds
 from .verbs import Place, verb
 
+LEVEL = 1
+"""Zstandard's level: 5 % more bytes than its 3, a third less time."""
+
 
 @dataclass(frozen=True)
 class Conversion:
@@ -98,7 +101,7 @@ def segment_lines(segments: Iterable[Segment], start_ns: int) -> list[str]:
 def finding_lines(findings: Iterable[Finding], start_ns: int) -> list[str]:
     """One line for each finding that is at least a warning."""
     return [
-        f"{f.severity.name.lower()} at {seconds(f.time_ns - start_ns)}: {f.topic}: {f.kind}: {f.advice}"
+        f"{f.severity.name.lower()} at {seconds(f.time_ns - start_ns)}: {f.topic or 'log'}: {f.kind}: {f.advice}"
         for f in findings
         if f.severity >= 30
     ]
@@ -206,5 +209,5 @@ def convert(
     viewed = bodies_columns(list(vehicles.values()))
     columns = [*ingested.columns, *viewed, *both(ingested.findings, ingested.notes)]
     target.parent.mkdir(parents=True, exist_ok=True)
-    storage.write(target, columns, metadata=metadata, compression=compression, force=force)
+    storage.write(target, columns, metadata=metadata, compression=compression, level=LEVEL, force=force)
     return summary(log, ingested, target, columns)

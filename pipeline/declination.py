@@ -9,11 +9,13 @@ from ..schemas import records
 from ..schemas.finding import Finding, Kind, Severity
 from ..schemas.recording import Declination, Fix, Recording
 
+DECLINATION_PARAMETERS = {"COMPASS_DEC": math.degrees(1.0), "EKF2_MAG_DECL": 1.0, "ATT_MAG_DECL": 1.0}
+"""Parameters of ArduPilot and PX4 with the degrees that one of their units is."""
 FIRST_UTC_NS = 946_684_800 * 1_000_000_000  # 2000-01-01: stamps before it count from boot, not from 1970
 
 
 def with_declination(recording: Recording, stated_deg: float | None) -> tuple[Recording, list[Finding]]:
-    """The recording with its declination: as stated, else the autopilot's COMPASS_DEC, else the World Magnetic Model at
+    """The recording with its declination: as stated, else the autopilot's parameter, else the World Magnetic Model at
     the first fix and its date, else 0 with a finding."""
     parameters = recording.metadata.get(records.PARAMETERS, {}) if not recording.prefix else {}
     found = _stated(stated_deg) or _parameter(parameters) or _model(recording.gnss)
@@ -31,9 +33,11 @@ def _stated(degrees: float | None) -> Declination | None:
 
 
 def _parameter(parameters: Mapping[str, str]) -> Declination | None:
-    value = float(parameters.get("COMPASS_DEC", "nan"))
-    # ArduPilot's default 0 means that the autopilot has not looked it up yet.
-    return None if not math.isfinite(value) or value == 0.0 else Declination(math.degrees(value), "COMPASS_DEC")
+    for name, degrees in DECLINATION_PARAMETERS.items():
+        value = float(parameters.get(name, "nan")) * degrees
+        if math.isfinite(value) and value != 0.0:  # the default 0 means that the autopilot has not looked it up yet
+            return Declination(value, name)
+    return None
 
 
 def _model(gnss: Mapping[int, Fix]) -> Declination | None:

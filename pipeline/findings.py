@@ -98,7 +98,7 @@ def _text(value: bytes | str) -> str:
 def mirror(finding: Finding) -> Note:
     """The finding in words."""
     size = f" ({finding.value:.4g} {finding.unit})" if finding.unit else ""
-    text = f"{finding.topic}: {finding.kind}{size}: {finding.advice}"
+    text = f"{finding.topic or 'log'}: {finding.kind}{size}: {finding.advice}"
     end = finding.end_ns if finding.end_ns > finding.time_ns else None
     return Note(finding.time_ns, finding.severity, f"{MIRROR}{finding.kind}", text, end)
 

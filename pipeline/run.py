@@ -15,7 +15,16 @@ from ..schemas.sensors import SensorProfile
 from ..schemas.source import Ingested
 from .analyze import Analysis, AnalysisOptions, Analyzed, analysis, analyze, analyze_recordings
 from .bodies import bodies_columns
-from .convert import Conversion, ingest_options, ingested_recordings, is_log, metadata_records, read_source, summary
+from .convert import (
+    LEVEL,
+    Conversion,
+    ingest_options,
+    ingested_recordings,
+    is_log,
+    metadata_records,
+    read_source,
+    summary,
+)
 from .estimate import Estimated, Estimation, estimate, estimate_vehicles, estimation
 from .findings import both
 from .inputs import check_target, is_mcap, outputs
@@ -84,7 +93,7 @@ def run(
     work = _work(path, ingested, metadata, estimators, declination, options)
     columns = [*ingested.columns, *work.columns(), *both([*ingested.findings, *work.findings()], ingested.notes)]
     target.parent.mkdir(parents=True, exist_ok=True)
-    storage.write(target, columns, metadata=metadata, compression=compression, force=force)
+    storage.write(target, columns, metadata=metadata, compression=compression, level=LEVEL, force=force)
     return Run(
         summary(log, ingested, target, columns),
         estimation(path, target, work.estimated, work.start_ns) if work.estimated else None,

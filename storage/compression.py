@@ -9,6 +9,9 @@ import zstandard
 LARGEST_RATIO: Mapping[str, int] = {"zstd": 1 << 16, "lz4": 256, "": 1}
 """No stream of the format unpacks to more than this many times its size, so a claim beyond it is damage."""
 
+LEVEL = 3
+"""Zstandard's level unless another is asked for."""
+
 
 class Codec(Protocol):
     """Packs and unpacks chunks."""
@@ -31,9 +34,9 @@ class Plain:
 
 
 class Zstd:
-    """Zstandard, level 3; unpacks into a buffer that is kept, since fresh memory costs as much again."""
+    """Zstandard; unpacks into a buffer that is kept, since fresh memory costs as much again."""
 
-    def __init__(self, level: int = 3) -> None:
+    def __init__(self, level: int = LEVEL) -> None:
         self._pack = zstandard.ZstdCompressor(level=level)
         self._unpack = zstandard.ZstdDecompressor()
         self._buffer = memoryview(bytearray())
@@ -78,6 +81,6 @@ class Lz4:
         return bytes(unpacked)
 
 
-def codecs() -> dict[str, Codec]:
+def codecs(level: int = LEVEL) -> dict[str, Codec]:
     """A new set of codecs by the name that chunks carry (they keep state, so none is shared between threads)."""
-    return {"": Plain(), "zstd": Zstd(), "lz4": Lz4()}
+    return {"": Plain(), "zstd": Zstd(level), "lz4": Lz4()}

@@ -10,7 +10,7 @@ import numpy as np
 from ..schemas.columns import Channel, Columns
 from ..schemas.errors import StorageError, UsageError
 from .chunks_out import ChunkWriter, Outlet, write_idle
-from .compression import codecs
+from .compression import LEVEL, codecs
 from .contents import Contents, write_attachment, write_end, write_header, write_metadata
 from .records import Attachment, ChannelRecord, SchemaRecord
 from .rows import rows_of
@@ -43,21 +43,22 @@ def write(
     metadata: Mapping[str, Mapping[str, str]] | None = None,
     attachments: Sequence[Attachment] = (),
     compression: str = "zstd",
+    level: int = LEVEL,
     force: bool = False,
     apart: Callable[[str], bool] = is_derived,
 ) -> None:
     """Write channels to ``path``, interleaved by time, with profile ros2, every index and every CRC.
 
-    ``compression``: zstd, lz4 or none. The topics ``apart`` get chunks of their own, behind the others, so that
-    `annotate` can replace them without touching the rest. The file appears whole or not at all; StorageError where it
-    exists (unless ``force``) or the disk refuses, UsageError for two channels of one topic.
+    ``compression``: zstd (at ``level``), lz4 or none. The topics ``apart`` get chunks of their own, behind the others,
+    so that `annotate` can replace them without touching the rest. The file appears whole or not at all; StorageError
+    where it exists (unless ``force``) or the disk refuses, UsageError for two channels of one topic.
     """
     channels = list(columns)
     name = compression_name(compression)
     with replacing(Path(path), force) as sink:
         contents = Contents()
         write_header(sink, PROFILE, LIBRARY)
-        add_channels(ChunkWriter(sink, contents, name, codecs()[name]), channels, apart=apart)
+        add_channels(ChunkWriter(sink, contents, name, codecs(level)[name]), channels, apart=apart)
         for item in attachments:
             write_attachment(sink, contents, item)
         for title, entries in (metadata or {}).items():
