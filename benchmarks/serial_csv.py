@@ -42,7 +42,9 @@ def synthetic(count: int, seed: int = 1) -> str:
     """What a nine-axis logger prints at 1 kHz."""
     rng = np.random.default_rng(seed)
     time_us = np.cumsum(rng.integers(950, 1050, count))
-    values = rng.normal(0.0, [0.1] * 3 + [20.0] * 3 + [10.0] * 3, (count, 9)) + [0, 0, 1, 0, 0, 0, 20, 0, -40]
+    noise = np.repeat([0.1, 20.0, 10.0], 3)
+    mean = np.array([0, 0, 1, 0, 0, 0, 20, 0, -40])
+    values = rng.normal(mean, noise, (count, 9))
     frame = pd.DataFrame(np.round(values, 5))
     frame.insert(0, "t", time_us)
     out = io.StringIO()

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from contextlib import suppress
-from typing import Any, Final
+from typing import Any, Final, Literal
 
 import numpy as np
 import pyarrow as pa
@@ -33,7 +33,7 @@ def numbers(data: Bytes, dialect: Dialect, exact: int | None, odd: list[int] | N
     Lines with another number of fields are skipped, and their numbers (from 0) put into ``odd``; an empty line is a row
     of nulls. ArrowInvalid where a value is no number, or without ``odd`` where a line has other fields.
     """
-    kinds = [pa.binary() if text else pa.float64() for text in dialect.is_text]
+    kinds: list[Any] = [pa.binary() if text else pa.float64() for text in dialect.is_text]
     kind = _exact_kind(data, dialect, exact)
     if exact is not None and kind is not None and not dialect.is_text[exact]:
         kinds[exact] = kind
@@ -66,19 +66,19 @@ def empty_rows(table: pa.Table) -> Mask | None:
         return None
     empty = np.ones(len(table), np.bool_)
     for column in table.columns:
-        blank = pc.equal(column, b"") if pa.types.is_binary(column.type) else pc.is_null(column)
+        blank = pc.equal(column, pa.scalar(b"")) if pa.types.is_binary(column.type) else pc.is_null(column)
         empty &= blank.to_numpy()
     return empty if np.any(empty) else None
 
 
-def _read(data: Bytes, dialect: Dialect, kinds: list[pa.DataType], odd: list[int] | None) -> pa.Table:
-    def skip(row: Any) -> str:
+def _read(data: Bytes, dialect: Dialect, kinds: list[Any], odd: list[int] | None) -> pa.Table:
+    def skip(row: Any) -> Literal["skip"]:
         assert odd is not None
         odd.append(row.number - 1)
         return "skip"
 
     names = [f"c{column}" for column in range(dialect.fields)]
-    types: Mapping[str, pa.DataType] = dict(zip(names, kinds, strict=True))
+    types: Mapping[str, Any] = dict(zip(names, kinds, strict=True))
     parse_options = csv.ParseOptions(
         delimiter=dialect.delimiter.decode(),
         quote_char='"' if np.any(data[:SAMPLE_BYTES] == _QUOTE) else False,
