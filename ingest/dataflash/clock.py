@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...schemas import Segment
+from ...signals.envelope import Line, fit, median_offset
 from .clock_kernels import BACKWARD, FORWARD, NO_TIME, pieces
-from .envelope import Line, fit, median_offset
 from .leap_seconds import SECOND_NS, utc_from_gps
 from .log import Log, Records
 

@@ -7,12 +7,12 @@ doi:10.1109/INFCOM.1999.749287).
 """
 
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...signals.envelope import edge
 from .rows_kernel import WRAP_US
 from .scan_kernel import Ints
 
@@ -22,7 +22,6 @@ WINDOW_MOST: Final = 2000
 ENOUGH: Final = 20
 FEW: Final = 3
 WRAP_SLACK_US: Final = 60_000_000
-BINS: Final = 64
 SPAN_US: Final = 60_000_000
 LARGEST_DRIFT: Final = 500e-6
 SIMULATED_DRIFT: Final = 0.02
@@ -151,7 +150,7 @@ def envelope(seen: Observations) -> Line:
     span = float(own.max() - own.min())
     rate = _simulated_rate(own, delay, span)
     offset = delay if rate == 1.0 else delay - (rate - 1.0) * own
-    slope = _hull_slope(own, offset) if span >= SPAN_US else 0.0
+    slope = -edge(own - own.min(), -offset)[0] if span >= SPAN_US else 0.0
     if rate == 1.0:
         slope = min(max(slope, -LARGEST_DRIFT), LARGEST_DRIFT)
     lowest = float((offset - slope * own if slope else offset).min())
@@ -164,27 +163,6 @@ def _simulated_rate(own: NDArray[np.float64], delay: NDArray[np.float64], span: 
         return 1.0
     rate = 1.0 + float((delay[-1] - delay[0]) / (own[-1] - own[0]))
     return rate if rate > 0 and abs(rate - 1.0) > SIMULATED_DRIFT else 1.0
-
-
-def _hull_slope(own: NDArray[np.float64], offset: NDArray[np.float64]) -> float:
-    """Slope of the lower convex hull's edge over the mean of ``own``, from the least offset in each of a few bins."""
-    edges = np.unique(np.linspace(0, len(own), BINS + 1).astype(int))
-    lowest = [a + int(offset[a:b].argmin()) for a, b in pairwise(edges)]
-    points = sorted((float(own[i]), float(offset[i])) for i in lowest)
-    hull: list[tuple[float, float]] = []
-    for point in points:
-        while len(hull) > 1 and _turn(hull[-2], hull[-1], point) <= 0:
-            hull.pop()
-        hull.append(point)
-    middle = float(own.mean())
-    for (x0, y0), (x1, y1) in pairwise(hull):
-        if x0 <= middle <= x1 and x1 > x0:
-            return (y1 - y0) / (x1 - x0)
-    return 0.0
-
-
-def _turn(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> float:
-    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 
 
 def fit_pairs(own: Ints, utc: Ints) -> Line:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...schemas import Segment
-from ..dataflash.envelope import Line, fit
+from ...signals.envelope import Line, fit
 from .clock_kernels import BACKWARD, follow
 from .log import Log, Topic
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from attlog.ingest.dataflash.envelope import Line, fit
+from attlog.signals.envelope import Line, fit
 from attlog.ingest.dataflash.leap_seconds import utc_from_gps
 from attlog.schemas import Kind
 

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Ints = NDArray[np.int64]
+Floats = NDArray[np.float64]
 
 OUTLIER_NS: Final = 500_000_000
 SHORTEST_NS: Final = 300_000_000_000
@@ -55,24 +56,32 @@ def fit(boot_ns: Ints, offset_ns: Ints) -> Line | None:
     if len(boot) < 3 or int(boot.max() - boot.min()) < SHORTEST_NS:
         return Line(top)
     origin, base = int(boot.min()), int(np.median(offset))
-    x, y = _highest(boot - origin, offset - base)
-    left, right = _edge(x, y, float(np.mean(boot - origin)))
-    slope = (y[right] - y[left]) / (x[right] - x[left])
+    slope, height = edge((boot - origin).astype(np.float64), (offset - base).astype(np.float64))
     if abs(slope) > STEEPEST:
         return Line(top)
-    return Line(base + round(float(y[left] - slope * x[left])), float(slope), origin)
+    return Line(base + round(height), slope, origin)
 
 
-def _highest(x: Ints, y: Ints) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def edge(x: Floats, y: Floats) -> tuple[float, float]:
+    """Slope and height at 0 of the upper convex hull's edge over the mean of ``x``, for points (n,), x >= 0."""
+    across, up = _highest(x, y)
+    if len(across) < 2:
+        return 0.0, float(y.max())
+    left, right = _edge(across, up, float(x.mean()))
+    slope = float((up[right] - up[left]) / (across[right] - across[left]))
+    return slope, float(up[left] - slope * across[left])
+
+
+def _highest(x: Floats, y: Floats) -> tuple[Floats, Floats]:
     """The highest point of each of some equal spans of x, in order of x."""
-    span = (x * BINS) // (int(x.max()) + 1)
+    span = (x * (BINS / (float(x.max()) + 1.0))).astype(np.int64)
     order = np.lexsort((y, span))
     last = np.flatnonzero(np.append(np.diff(span[order]) > 0, True))
     chosen = order[last]
-    return x[chosen].astype(np.float64), y[chosen].astype(np.float64)
+    return x[chosen], y[chosen]
 
 
-def _edge(x: NDArray[np.float64], y: NDArray[np.float64], middle: float) -> tuple[int, int]:
+def _edge(x: Floats, y: Floats, middle: float) -> tuple[int, int]:
     """The two neighbours of the upper convex hull between which ``middle`` lies."""
     hull: list[int] = []
     for i in range(len(x)):
