@@ -99,10 +99,21 @@ class ChunkWriter:
 
     def chunk(self, data: memoryview, indexes: list[tuple[int, bytes]], start_ns: int, end_ns: int) -> None:
         """One chunk from its uncompressed bytes and its message indexes (channel id, entries)."""
-        checksum = crc32(data)
-        body = self.codec.compress(data)
-        head = struct.pack("<QQQI", start_ns, end_ns, len(data), checksum)
-        head += text(self.compression) + struct.pack("<Q", len(body))
+        self.packed(self.codec.compress(data), len(data), crc32(data), self.compression, indexes, start_ns, end_ns)
+
+    def packed(
+        self,
+        body: bytes | memoryview,
+        size: int,
+        checksum: int,
+        compression: str,
+        indexes: list[tuple[int, bytes]],
+        start_ns: int,
+        end_ns: int,
+    ) -> None:
+        """One chunk that is compressed already, from ``size`` bytes."""
+        head = struct.pack("<QQQI", start_ns, end_ns, size, checksum)
+        head += text(compression) + struct.pack("<Q", len(body))
         offset = self.sink.position
         self.sink.write(struct.pack("<BQ", Op.CHUNK, len(head) + len(body)) + head)
         self.sink.write(body)
@@ -115,9 +126,7 @@ class ChunkWriter:
         self.sink.write(b"".join(parts))
         self.contents.saw(start_ns, end_ns)
         self.contents.chunks.append(
-            ChunkIndex(
-                start_ns, end_ns, offset, after - offset, offsets, at - after, self.compression, len(body), len(data)
-            )
+            ChunkIndex(start_ns, end_ns, offset, after - offset, offsets, at - after, compression, len(body), size)
         )
 
 

@@ -78,7 +78,7 @@ def _check_magic(file: InputFile) -> None:
     if file.size < least or file.read(file.size - len(MAGIC), len(MAGIC)) != MAGIC:
         raise InputError(
             f"{file.path}: byte {file.size}: the file ends without MCAP's closing magic, so it is truncated, or its "
-            "writer was stopped; copy it again or make it again from its source"
+            f"writer was stopped; save what is in it with: attlog recover {file.path}"
         )
 
 
