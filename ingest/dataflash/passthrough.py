@@ -13,6 +13,7 @@ from ...schemas import Channel, Columns
 from ...schemas.columns import Table
 from ...schemas.definition import MessageType
 from ...schemas.passthrough import SourceField, generated_type, source_names
+from ...schemas.texts import clean
 from .clock import Clock
 from .formats import Format
 from .log import Records
@@ -90,9 +91,9 @@ def _stored(records: Records, message: MessageType) -> Table:
         if character == "g":
             replaced[column] = records.data[column].astype(np.float32)
         elif form.dtype[column].kind == "S" and (form.name, column) not in BYTES:
-            clean = _clean(records.data[column])
-            if clean is not None:
-                replaced[column] = clean
+            text = clean(records.data[column])
+            if text is not None:
+                replaced[column] = text
     dtype = _renamed(records, names)
     if not replaced:
         return records.data.view(dtype)
@@ -111,32 +112,3 @@ def _renamed(records: Records, names: Mapping[str, str]) -> "np.dtype[np.void]":
         as_bytes = (records.format.name, column) in BYTES
         types.append((names[column], np.dtype(("u1", (stored.itemsize,))) if as_bytes else stored))
     return np.dtype(types)
-
-
-def _clean(strings: NDArray[np.bytes_]) -> NDArray[np.bytes_] | None:
-    """Strings that end at their first NUL and are UTF-8; None if they are so already."""
-    if len(strings) == 0:
-        return None
-    width = strings.dtype.itemsize
-    matrix = np.ascontiguousarray(strings).view(np.uint8).reshape(len(strings), width)
-    over = np.logical_or.accumulate(matrix == 0, axis=1)
-    junk = bool(np.any(matrix[over]))
-    foreign = np.any((matrix >= 0x80) & ~over, axis=1)
-    if not junk and not np.any(foreign):
-        return None
-    cut = np.where(over, np.uint8(0), matrix).view(f"S{width}")[:, 0]
-    if not np.any(foreign):
-        return cut
-    legal = {row: _utf8(bytes(cut[row])) for row in np.flatnonzero(foreign).tolist()}
-    result = cut.astype(f"S{max(width, *map(len, legal.values()))}")
-    for row, value in legal.items():
-        result[row] = value
-    return result
-
-
-def _utf8(value: bytes) -> bytes:
-    try:
-        value.decode()
-    except UnicodeDecodeError:
-        return value.decode("latin-1").encode()
-    return value

@@ -6,11 +6,11 @@ from collections.abc import Iterable, Iterator
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...schemas import Channel, Columns
 from ...schemas.columns import Table
 from ...schemas.passthrough import ros_type_name
+from ...schemas.texts import clean, replaced
 from .clock import Clock, time_us
 from .formats import Definition
 from .log import Topic
@@ -59,40 +59,6 @@ def _stored(topic: Topic) -> Table:
             data = data.copy()
             stored = data.view(np.uint8).reshape(len(data), -1)
             stored[:, flags] = stored[:, flags] != 0
-    cleaned = {name: _clean(data[name]) for name in topic.definition.texts}
+    cleaned = {name: clean(data[name]) for name in topic.definition.texts}
     changed = {name: values for name, values in cleaned.items() if values is not None}
-    return _replaced(data, changed) if changed else data
-
-
-def _replaced(data: Table, changed: dict[str, NDArray[np.bytes_]]) -> Table:
-    fields = data.dtype.names or ()
-    result = np.zeros(
-        len(data), [(name, changed[name].dtype if name in changed else data.dtype[name]) for name in fields]
-    )
-    for name in fields:
-        result[name] = changed.get(name, data[name])
-    return result
-
-
-def _clean(strings: NDArray[np.bytes_]) -> NDArray[np.bytes_] | None:
-    """Texts cut at their first NUL, and Latin-1 made UTF-8; None where they are clean already."""
-    width = strings.dtype.itemsize
-    stored = np.ascontiguousarray(strings).view(np.uint8).reshape(len(strings), width)
-    ended = np.logical_or.accumulate(stored == 0, axis=1)
-    foreign = np.flatnonzero(np.any((stored >= 0x80) & ~ended, axis=1))
-    if not len(foreign) and not np.any(stored[ended]):
-        return None
-    cut = np.where(ended, np.uint8(0), stored).view(f"S{width}")[:, 0]
-    legal = {row: _utf8(bytes(cut[row])) for row in foreign.tolist()}
-    result = cut.astype(f"S{max([width, *map(len, legal.values())])}")
-    for row, value in legal.items():
-        result[row] = value
-    return result
-
-
-def _utf8(value: bytes) -> bytes:
-    try:
-        value.decode()
-    except UnicodeDecodeError:
-        return value.decode("latin-1").encode()
-    return value
+    return replaced(data, changed)
