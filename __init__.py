@@ -13,14 +13,15 @@ Conventions, everywhere in this package and said once here:
 
 The calls behind the command line's verbs (`convert`, `estimate`, `analyze`, `run`, `info`, `annotate`, `simulate`) take
 one log and return its result, or take a list of files, folders and globs and return the `Outcomes` of them all;
-`for_each` does the latter with a number of jobs. `open` reads an MCAP.
+`for_each` does the latter with a number of jobs. `recover` makes damaged MCAPs whole likewise, `record` takes one live
+source. `open` reads an MCAP.
 """
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .pipeline import analyze, annotate, convert, estimate, for_each, info, run, simulate
+    from .pipeline import analyze, annotate, convert, estimate, for_each, info, record, recover, run, simulate
     from .schemas.errors import AttlogError, InputError, MissingSensorError, StorageError, UsageError
     from .storage import open
 
@@ -31,6 +32,8 @@ _HOME = {
     "estimate": ".pipeline",
     "for_each": ".pipeline",
     "info": ".pipeline",
+    "record": ".pipeline",
+    "recover": ".pipeline",
     "run": ".pipeline",
     "simulate": ".pipeline",
     "open": ".storage",
@@ -55,6 +58,8 @@ __all__ = [
     "for_each",
     "info",
     "open",
+    "record",
+    "recover",
     "run",
     "simulate",
 ]

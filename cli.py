@@ -15,6 +15,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 EXIT_NOTHING = 1
 EXIT_USAGE = 2
+EXIT_PARTIAL = 3
 EXIT_INTERRUPTED = 130
 
 
@@ -221,6 +222,66 @@ def simulate(scenario: str, seed: int, output: str, force: bool, as_json: bool) 
     from . import pipeline
 
     _print(pipeline.simulate(scenario, output, seed=seed, force=force), as_json)
+
+
+@cli.command()
+@click.argument("source")
+@click.option("-o", "--output", required=True, help="File to write (.mcap).")
+@click.option("--duration", metavar="TIME", help="Stop after 90s, 10min, 2h, ….  [default: at Ctrl-C or SIGTERM]")
+@click.option("--rotate-size", metavar="SIZE", help="Begin a new file after 100MB, 1GiB, … have arrived.")
+@click.option("--rotate-time", metavar="TIME", help="Begin a new file after 10min, 1h, ….")
+@click.option("--keep-stream/--drop-stream", default=True, show_default=True, help="Keep the bytes as they arrived.")
+@FORCE
+@JSON
+@SOURCE
+@click.pass_context
+def record(
+    context: click.Context,
+    source: str,
+    output: str,
+    duration: str | None,
+    rotate_size: str | None,
+    rotate_time: str | None,
+    as_json: bool,
+    **options: Any,
+) -> None:
+    """Record a serial port or a MAVLink link until Ctrl-C.
+
+    SOURCE is serial:/dev/ttyUSB0:115200 (lines of CSV), mavlink:udpin:0.0.0.0:14550, mavlink:tcp:HOST:PORT,
+    mavlink:tcpin:0.0.0.0:PORT or mavlink:serial:/dev/ttyACM0:57600. With rotation the files are FILE_0001.mcap, ….
+    """
+    from . import pipeline
+    from .pipeline.amounts import bytes_of, seconds_of
+    from .pipeline.terminal import StatusLine, stopping
+
+    options = _with_csv(options) | {"vehicle": _vehicle(options["vehicle"])}
+    options |= {"duration_s": duration and seconds_of(duration), "rotate_s": rotate_time and seconds_of(rotate_time)}
+    options |= {"rotate_bytes": rotate_size and bytes_of(rotate_size)}
+    line = StatusLine(not context.find_root().params["quiet"])
+    with stopping() as stop:
+        done = pipeline.record(source, output, stop=stop, watch=lambda now: line.show(now.to_text()), **options)
+        line.end()
+    if not done.files:
+        click.echo(f"attlog: {source}: nothing arrived; nothing was written", err=True)
+        sys.exit(EXIT_INTERRUPTED if stop.asked else EXIT_NOTHING)
+    _print(done, as_json)
+    sys.exit(0 if done.complete else EXIT_PARTIAL)
+
+
+@cli.command()
+@LOGS
+@COMMON
+@SOURCE
+def recover(logs: Sequence[str], jobs: int | None, timeout: float, as_json: bool, **options: Any) -> None:
+    """Make whole MCAPs of ones that were cut off, killed or damaged (FILE.recovered.mcap beside each).
+
+    Of a recording that was killed, the stream becomes channels as at its end; the options say what it is.
+    """
+    from . import pipeline
+
+    options = _with_csv(options) | {"vehicle": _vehicle(options["vehicle"])}
+    del options["compression"]
+    _show(pipeline.for_each(pipeline.recover, logs, jobs=jobs, timeout_s=timeout, **options), as_json)
 
 
 @cli.command(name="list")

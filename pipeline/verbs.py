@@ -18,7 +18,7 @@ class Verb(Generic[P, T]):
     """A call on one log. One log gives its result or raises; a list of files, folders and globs gives `Outcomes`.
 
     ``accepts`` says which files of a folder it takes; ``writes`` whether it has an ``output``; ``in_place`` whether
-    that is the log itself unless another is named.
+    that is the log itself unless another is named; ``suffix`` is that of an output's name.
     """
 
     def __init__(
@@ -27,11 +27,13 @@ class Verb(Generic[P, T]):
         accepts: Callable[[Path], bool],
         in_place: bool,
         writes: bool,
+        suffix: str = ".mcap",
     ) -> None:
         self.one = one
         self.accepts = accepts
         self.in_place = in_place
         self.writes = writes
+        self.suffix = suffix
         functools.update_wrapper(self, one)
 
     @overload
@@ -51,15 +53,15 @@ class Verb(Generic[P, T]):
         """The argument that says where each file's result goes."""
         if not self.writes:
             return [{} for _ in files]
-        places = files if self.in_place and output is None else outputs(files, output)
+        places = files if self.in_place and output is None else outputs(files, output, self.suffix)
         return [{"output": place} for place in places]
 
 
 def verb(
-    accepts: Callable[[Path], bool], *, in_place: bool = False, writes: bool = True
+    accepts: Callable[[Path], bool], *, in_place: bool = False, writes: bool = True, suffix: str = ".mcap"
 ) -> Callable[[Callable[Concatenate[Place, P], T]], Verb[P, T]]:
     """Make a call on one log a `Verb`."""
-    return lambda one: Verb(one, accepts, in_place, writes)
+    return lambda one: Verb(one, accepts, in_place, writes, suffix)
 
 
 def for_each(

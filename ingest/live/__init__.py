@@ -6,7 +6,7 @@ What arrives is kept as it is, in pieces with their arrival stamps (`pieces`), c
 
 from .address import Address, Kind
 from .connections import Connection, connect
-from .pieces import TOPIC, Pieces, from_columns, to_columns
+from .pieces import TOPIC, Pieces, arrivals_of, from_columns, to_columns
 from .reading import Live, read
 from .receiver import Receiver
 
@@ -18,6 +18,7 @@ __all__ = [
     "Live",
     "Pieces",
     "Receiver",
+    "arrivals_of",
     "connect",
     "from_columns",
     "read",

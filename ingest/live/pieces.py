@@ -28,6 +28,7 @@ STREAM: Final = MessageType(
 )
 CHANNEL: Final = Channel(TOPIC, STREAM)
 MICROSECOND: Final = 1000
+SECOND: Final = 10**9
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +54,9 @@ def to_columns(arrivals: Sequence[Arrival]) -> Columns:
     event = arrivals[0][2].encode()
     lengths = {"event": len(event), "size": len(sizes), "after_us": len(sizes), "data": len(data)}
     dtype = STREAM.dtype(lengths)
-    row: NDArray[Any] = np.zeros(1, [(name, dtype[name]) for name in ("event", "size", "after_us", "data")])
+    row: NDArray[Any] = np.zeros(1, [(name, dtype[name]) for name in ("header", "event", "size", "after_us", "data")])
+    stamp = row["header"]["stamp"]
+    stamp["sec"], stamp["nanosec"] = divmod(start, SECOND)
     if event:
         row["event"] = event
     if sizes:
@@ -64,8 +67,8 @@ def to_columns(arrivals: Sequence[Arrival]) -> Columns:
 
 
 def from_columns(columns: Columns) -> Pieces:
-    """All pieces of a recording, in the order of their arrival."""
-    start = columns.time_ns.tolist()
+    """All pieces of a recording, in the order of their arrival (by the headers: log times may have been moved)."""
+    start = arrivals_of(columns).tolist()
     sizes = [np.asarray(size, np.int64) for size in columns["size"]]
     after = [np.asarray(times, np.int64) for times in columns["after_us"]]
     data = [np.asarray(part, np.uint8) for part in columns["data"]]
@@ -82,6 +85,12 @@ def from_columns(columns: Columns) -> Pieces:
         np.concatenate([*times, empty]),
         tuple(events),
     )
+
+
+def arrivals_of(columns: Columns) -> Ints:
+    """When the first piece of each message arrived."""
+    stamp = columns["header"]["stamp"]
+    return np.asarray(stamp["sec"].astype(np.int64) * SECOND + stamp["nanosec"])
 
 
 def grouped(arrivals: Sequence[Arrival]) -> list[list[Arrival]]:

@@ -16,6 +16,7 @@ from .pieces import MICROSECOND, Bytes, Pieces
 NEWLINE: Final = 10
 STAMP: Final = 8
 LOST: Final = "lost"
+ANOTHER_DATE_NS: Final = 60 * 10**9
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,6 +25,8 @@ class Live:
 
     source: Source
     ingested: Ingested
+    shift_ns: int = 0
+    """From the time of arrival to the log's, where the device keeps another date (a replay, a simulation)."""
 
 
 def read(name: str, kind: Format, pieces: Pieces, options: IngestOptions, header: bytes = b"") -> Live:
@@ -36,11 +39,18 @@ def read(name: str, kind: Format, pieces: Pieces, options: IngestOptions, header
     if len(pieces.data) == 0:
         raise InputError(f"{name}: nothing arrived")
     live: Live = _READERS[kind](name, pieces, options, header)
-    told = tuple(_link_findings(pieces))
-    notes = tuple(Note(time_ns, Severity.INFO, "link", text) for time_ns, text in pieces.events)
+    shift = _shift(pieces, live.ingested)
+    told = tuple(_link_findings(pieces, shift))
+    notes = tuple(Note(time_ns + shift, Severity.INFO, "link", text) for time_ns, text in pieces.events)
     ingested = live.ingested
     ingested = replace(ingested, findings=(*ingested.findings, *told), notes=(*ingested.notes, *notes))
-    return replace(live, ingested=ingested)
+    return replace(live, ingested=ingested, shift_ns=shift)
+
+
+def _shift(pieces: Pieces, ingested: Ingested) -> int:
+    first = min((int(c.time_ns.min()) for c in ingested.columns if len(c)), default=int(pieces.time_ns[0]))
+    apart = first - int(pieces.time_ns[0])
+    return apart if abs(apart) > ANOTHER_DATE_NS else 0
 
 
 def _mavlink(name: str, pieces: Pieces, options: IngestOptions, _header: bytes) -> Live:
@@ -87,7 +97,7 @@ def header_of(data: Bytes) -> bytes:
     return b"".join(lines[number] + b"\n" for number in (dialect.header_lines if dialect is not None else ()))
 
 
-def _link_findings(pieces: Pieces) -> Iterator[Finding]:
+def _link_findings(pieces: Pieces, shift_ns: int) -> Iterator[Finding]:
     """One finding for each time without a link."""
     for number, (time_ns, text) in enumerate(pieces.events):
         if not text.startswith(LOST):
@@ -95,4 +105,6 @@ def _link_findings(pieces: Pieces) -> Iterator[Finding]:
         after = pieces.events[number + 1 :]
         end_ns = after[0][0] if after else time_ns
         advice = f"the link was lost ({text.removeprefix(LOST).strip(': ')}); what was sent meanwhile is missing"
-        yield Finding(time_ns, end_ns, Severity.WARN, Kind.GAP, "", (end_ns - time_ns) / 1e9, "s", advice)
+        yield Finding(
+            time_ns + shift_ns, end_ns + shift_ns, Severity.WARN, Kind.GAP, "", (end_ns - time_ns) / 1e9, "s", advice
+        )
