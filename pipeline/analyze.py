@@ -1,7 +1,7 @@
 """How wrong each attitude of a log is, added to its MCAP."""
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -9,11 +9,13 @@ from .. import storage
 from ..analysis.channels import error_columns
 from ..analysis.error import AttitudeError, Span, attitude_error
 from ..analysis.table import ErrorTable
+from ..schemas.clock import ClockAlignment
 from ..schemas.columns import Columns
 from ..schemas.errors import InputError
 from ..schemas.recording import Attitude, Recording
 from .inputs import in_place_target, is_mcap
-from .logs import open_log, read_recordings
+from .logs import load, open_log, shifted
+from .own import OWN_TYPES
 from .provenance import software
 from .verbs import Place, verb
 
@@ -29,16 +31,17 @@ class Analysis:
     source: str
     output: str
     table: ErrorTable
+    remarks: tuple[str, ...] = ()
 
     complete = True
 
     def to_text(self) -> str:
         """What ``attlog analyze`` prints."""
-        return self.table.to_text()
+        return "\n".join([self.table.to_text(), *self.remarks])
 
     def to_dict(self) -> dict[str, Any]:
         """The same for --json."""
-        return {"output": self.output, "errors": self.table.to_dicts()}
+        return {"output": self.output, "errors": self.table.to_dicts(), "remarks": list(self.remarks)}
 
 
 @dataclass(frozen=True)
@@ -74,6 +77,29 @@ def choose_reference(recording: Recording, wanted: str | None) -> tuple[str, Att
     if name not in known:
         raise InputError(f"there is no attitude {wanted!r}; there are: {', '.join(known) or 'none'}")
     return name, known[name]
+
+
+def is_other_log(reference: str) -> bool:
+    """Whether a reference is spelled as a file, not as an attitude's name."""
+    return reference.endswith(".mcap") or Path(reference).is_file()
+
+
+def with_reference_of(
+    other: Path, vehicles: Mapping[str, Recording], alignments: Mapping[str, ClockAlignment]
+) -> tuple[dict[str, Recording], str]:
+    """The main vehicle with another log's attitude for its truth, on this log's clock; and a line that says so."""
+    with open_log(other) as log:
+        theirs = load(log).vehicles
+    if "" not in theirs:
+        raise InputError(f"{other}: no attitude to compare with: it has none that attlog knows")
+    _, attitude = choose_reference(theirs[""], None)
+    found = alignments.get(other.name)
+    aligned = shifted(replace(attitude, name="reference", topic=f"{other.name}:{attitude.topic}"), found)
+    line = (
+        f"clock aligned: {found.in_words()}" if found else f"{other.name}: clock taken as it is; attlog align finds it"
+    )
+    main = vehicles.get("", Recording())
+    return {**vehicles, "": replace(main, reference=aligned)}, line
 
 
 def errors_of(recording: Recording, options: AnalysisOptions, start_ns: int) -> dict[str, AttitudeError]:
@@ -131,10 +157,9 @@ def analyze_recordings(
     return [each for each in done if each.errors], reasons
 
 
-def is_error(topic: str) -> bool:
-    """Whether the topic holds errors, which a new analysis replaces."""
-    parts = topic.split("/")
-    return "error" in parts[1:3]
+def is_error(log: storage.LogFile, topic: str) -> bool:
+    """Whether the topic holds errors that attlog wrote, which a new analysis replaces."""
+    return "error" in topic.split("/")[1:3] and log.topics[topic].schema_name.startswith(OWN_TYPES)
 
 
 @verb(is_mcap, in_place=True)
@@ -146,12 +171,15 @@ def analyze(
     start: float | None = None,
     end: float | None = None,
     exclude: Sequence[tuple[float, float]] = (),
+    topics: Sequence[str] = (),
     output: Place | None = None,
     force: bool = False,
 ) -> Analysis:
     """Compare every attitude of an MCAP with a reference and add the errors as ``/error/{name}/attitude``, degrees.
 
-    ``reference`` is ``truth``, ``onboard``, or the name of an attitude; by default the truth, else the autopilot's.
+    ``reference`` is ``truth``, ``onboard``, the name of an attitude, or another MCAP, whose truth (else onboard
+    attitude) is taken on the clock that `align` found; by default the truth, else the autopilot's. ``topics`` say
+    ROLE=TOPIC for channels of other software, as for `estimate`.
     ``alignment`` says which constant rotation between the two is removed first: ``none``, ``yaw`` (about the vertical)
     or ``full``; by default none, but yaw where a heading counts from an arbitrary north. Only samples from ``start`` to
     ``end`` (seconds from the log's first message) and outside the spans ``exclude`` count. The file is annotated in
@@ -159,17 +187,23 @@ def analyze(
     """
     path, target = Path(source), in_place_target(source, output, force)
     with open_log(path) as log:
-        vehicles = read_recordings(log)
-        start_ns = log.start_ns
+        loaded = load(log, topics)
+        start_ns, gone = log.start_ns, frozenset(topic for topic in log.topics if is_error(log, topic))
+    vehicles, remarks = dict(loaded.vehicles), loaded.remarks
+    if reference is not None and is_other_log(reference):
+        vehicles, line = with_reference_of(Path(reference), vehicles, loaded.alignments)
+        reference, remarks = TRUTH, (*remarks, line)
     options = AnalysisOptions(reference, alignment, start, end, tuple(exclude))
     done, reasons = analyze_recordings(vehicles.values(), options, start_ns)
     if not done:
-        raise InputError(f"{path}: nothing to compare: {'; '.join(reasons) or 'the log has only one attitude'}")
+        why = reasons or ["the log has only one attitude"]
+        raise InputError(f"{path}: nothing to compare: {'; '.join([*why, *remarks])}")
     columns = [channel for each in done for channel in each.columns()]
-    storage.annotate(path, columns, remove=is_error, output=target)
-    return analysis(path, target, done)
+    storage.annotate(path, columns, remove=gone.__contains__, metadata=loaded.metadata, output=target)
+    return analysis(path, target, done, remarks)
 
 
-def analysis(source: Path, output: Path, done: Sequence[Analyzed]) -> Analysis:
+def analysis(source: Path, output: Path, done: Sequence[Analyzed], remarks: tuple[str, ...] = ()) -> Analysis:
     """The result for all vehicles of a log."""
-    return Analysis(str(source), str(output), ErrorTable.joined(each.table(str(output)) for each in done))
+    table = ErrorTable.joined(each.table(str(output)) for each in done)
+    return Analysis(str(source), str(output), table, remarks)

@@ -14,6 +14,7 @@ from ..schemas.finding import Note, Severity
 from .findings import ANNOTATIONS, PERSON, notes_columns
 from .inputs import in_place_target, is_mcap
 from .logs import everything_said, open_log
+from .own import moved, places
 from .text import seconds, table
 from .verbs import Place, verb
 
@@ -132,7 +133,7 @@ def annotate(
     path, target = Path(source), in_place_target(source, output, force)
     with open_log(path) as log:
         _, said = everything_said(log)
-        start_ns, end_ns = log.start_ns, log.end_ns
+        start_ns, end_ns, there = log.start_ns, log.end_ns, places(log)
     own = [note for note in said if note.name == PERSON]
     fresh = [_dated(each, start_ns) for each in add]
     _check(path, own, fresh, remove, (start_ns, end_ns))
@@ -141,7 +142,7 @@ def annotate(
     if add or remove or target != path:
         everyone = [*(note for note in said if note.name != PERSON), *mine]
         columns = [notes_columns(everyone)] if everyone else []
-        storage.annotate(path, columns, remove={ANNOTATIONS}.__contains__, output=target)
+        storage.annotate(path, moved(columns, there), remove={there[ANNOTATIONS]}.__contains__, output=target)
     return Annotated(str(path), str(target), tuple(mine), start_ns)
 
 

@@ -13,6 +13,8 @@ from ..schemas.unified import WORLD, nested
 
 TF = "/tf"
 BODIES = "/bodies"
+MADE_BY = ("source", "attlog")
+"""Entry of the channels' metadata that tells them from other people's of the same name."""
 RATE_HZ = 25.0
 MOST_TRANSFORMS = 10_000
 SPACING_M = 1.5
@@ -50,7 +52,7 @@ def bodies_columns(recordings: Sequence[Recording]) -> list[Columns]:
     if len(time_ns) == 0:
         return []
     return [
-        Columns(Channel(TF, TF_MESSAGE), time_ns, data),
+        Columns(Channel(TF, TF_MESSAGE, dict([MADE_BY])), time_ns, data),
         _markers([name for name, _ in frames], int(time_ns.min())),
     ]
 
@@ -109,7 +111,7 @@ def _markers(names: Sequence[str], time_ns: int) -> Columns:
     markers["frame_locked"] = True
     _fill_cubes(markers[0::2])
     _fill_labels(markers[1::2], names)
-    return Columns(Channel(BODIES, MARKER_ARRAY), np.array([time_ns], dtype=np.int64), row)
+    return Columns(Channel(BODIES, MARKER_ARRAY, dict([MADE_BY])), np.array([time_ns], dtype=np.int64), row)
 
 
 def _fill_cubes(cubes: "np.ndarray[tuple[int], np.dtype[np.void]]") -> None:

@@ -13,12 +13,13 @@ from ..schemas.estimate import Estimate, North
 from ..schemas.finding import Finding
 from ..schemas.recording import Recording
 from ..schemas.unified import estimate_columns
-from .bodies import BODIES, TF, bodies_columns
+from .bodies import bodies_columns
 from .convert import finding_lines
 from .declination import with_declination
-from .findings import ANNOTATIONS, FINDINGS, both, replaced
+from .findings import both, replaced
 from .inputs import in_place_target, is_mcap
-from .logs import everything_said, open_log, read_recordings
+from .logs import everything_said, load, open_log
+from .own import moved, places
 from .provenance import made_from
 from .text import table
 from .verbs import Place, verb
@@ -50,6 +51,7 @@ class Estimation:
     made: tuple[Made, ...]
     skipped: Mapping[str, str]
     start_ns: int
+    remarks: tuple[str, ...] = ()
 
     complete = True
 
@@ -57,6 +59,7 @@ class Estimation:
         """What ``attlog estimate`` prints."""
         rows = [(m.topic, f"{m.samples:,}", m.north, f"{m.declination_deg:.1f}", " ".join(m.inputs)) for m in self.made]
         lines = [self.output, table(("estimate", "samples", "north", "declination [deg]", "inputs"), rows, (1, 3))]
+        lines += self.remarks
         lines += [f"skipped {name}: {reason}" for name, reason in self.skipped.items()]
         lines += finding_lines(dict.fromkeys(f for made in self.made for f in made.findings), self.start_ns)
         return "\n".join(lines)
@@ -67,6 +70,7 @@ class Estimation:
             "output": self.output,
             "estimates": [vars(m) | {"findings": [vars(f) for f in m.findings]} for m in self.made],
             "skipped": dict(self.skipped),
+            "remarks": list(self.remarks),
         }
 
 
@@ -141,7 +145,11 @@ def _check_names(names: Sequence[str]) -> None:
 
 
 def estimate_vehicles(
-    path: Path, vehicles: Mapping[str, Recording], selected: Sequence[str] | None, declination_deg: float | None
+    path: Path,
+    vehicles: Mapping[str, Recording],
+    selected: Sequence[str] | None,
+    declination_deg: float | None,
+    hints: Sequence[str] = (),
 ) -> list[Estimated]:
     """Estimate on every vehicle that has an IMU; InputError where none could be estimated at all."""
     done = [
@@ -149,8 +157,8 @@ def estimate_vehicles(
         for recording in vehicles.values()
     ]
     if not any(each.made for each in done):
-        reasons = [reason for each in done for reason in each.skipped.values()]
-        raise InputError(f"{path}: nothing could be estimated: {'; '.join(reasons) or 'the log has no IMU channel'}")
+        reasons = [reason for each in done for reason in each.skipped.values()] or ["the log has no IMU channel"]
+        raise InputError(f"{path}: nothing could be estimated: {'; '.join([*reasons, *hints])}")
     return done
 
 
@@ -164,33 +172,38 @@ def estimate(
     estimators: Sequence[str] | None = None,
     *,
     declination: float | None = None,
+    topics: Sequence[str] = (),
     output: Place | None = None,
     force: bool = False,
 ) -> Estimation:
     """Estimate the attitude from the sensors of an MCAP and add each estimate as ``/estimate/{name}/attitude``.
 
     ``estimators`` are names with parameters, as ``"ecf:imu=1,kp=0.3,as=soft"``; by default ecf, ekf9 and gyro, or ecf,
-    ekf6 and gyro without a magnetometer. ``declination`` in degrees, east positive, overrides what the log knows. The
+    ekf6 and gyro without a magnetometer. ``declination`` in degrees, east positive, overrides what the log knows.
+    ``topics`` say ROLE=TOPIC for channels of other software (``"imu=/phone/imu"``, ``"reference=/vicon/pose"``). The
     file is annotated in place, or copied to ``output``. An estimate of the same name is replaced. InputError where the
     file cannot be read or nothing could be estimated, UsageError for an unknown estimator or parameter.
     """
     path, target = Path(source), in_place_target(source, output, force)
     with open_log(path) as log:
-        vehicles = read_recordings(log)
+        loaded = load(log, topics)
         findings, notes = everything_said(log)
-        start_ns = log.start_ns
-    done = estimate_vehicles(path, vehicles, estimators, declination)
+        start_ns, there = log.start_ns, places(log)
+    done = estimate_vehicles(path, loaded.vehicles, estimators, declination, loaded.remarks)
     columns = [channel for each in done for channel in each.columns]
     remade = {channel.channel.topic for channel in columns}
     new = [finding for each in done for finding in each.findings]
     columns += both(replaced(findings, new, remade.__contains__), notes)
     columns += bodies_columns([each.recording for each in done])
-    storage.annotate(path, columns, remove={TF, BODIES, FINDINGS, ANNOTATIONS}.__contains__, output=target)
-    return estimation(path, target, done, start_ns)
+    gone = frozenset(there.values())
+    storage.annotate(path, moved(columns, there), remove=gone.__contains__, metadata=loaded.metadata, output=target)
+    return estimation(path, target, done, start_ns, loaded.remarks)
 
 
-def estimation(source: Path, output: Path, done: Sequence[Estimated], start_ns: int) -> Estimation:
+def estimation(
+    source: Path, output: Path, done: Sequence[Estimated], start_ns: int, remarks: tuple[str, ...] = ()
+) -> Estimation:
     """The result for all vehicles of a log."""
     made = tuple(made for each in done for made in each.made)
     skipped = {f"{each.recording.prefix}{name}": why for each in done for name, why in each.skipped.items()}
-    return Estimation(str(source), str(output), made, skipped, start_ns)
+    return Estimation(str(source), str(output), made, skipped, start_ns, remarks)

@@ -8,7 +8,7 @@ from typing import Any, Literal
 from .. import storage
 from ..schemas.columns import Columns
 from ..schemas.csv_options import CsvOptions
-from ..schemas.errors import InputError
+from ..schemas.errors import InputError, UsageError
 from ..schemas.finding import Finding
 from ..schemas.recording import Recording
 from ..schemas.sensors import SensorProfile
@@ -69,6 +69,7 @@ def run(
     start: float | None = None,
     end: float | None = None,
     exclude: Sequence[tuple[float, float]] = (),
+    topics: Sequence[str] = (),
     vehicle: int | Literal["all"] | None = None,
     sensor: str | SensorProfile | None = None,
     dialect: str = "ardupilotmega",
@@ -85,7 +86,9 @@ def run(
     path = Path(source)
     options = AnalysisOptions(reference, alignment, start, end, tuple(exclude))
     if is_mcap(path):
-        return _run_on_mcap(path, output, estimators, declination, options, force)
+        return _run_on_mcap(path, output, estimators, declination, options, topics, force)
+    if topics:
+        raise UsageError(f"{path}: --topic chooses channels of an MCAP; what this format holds is known")
     target = outputs([path], output)[0]
     check_target(target, path, force)
     log, ingested = read_source(path, ingest_options(vehicle, sensor, dialect, csv))
@@ -149,10 +152,11 @@ def _run_on_mcap(
     estimators: Sequence[str] | None,
     declination: float | None,
     options: AnalysisOptions,
+    topics: Sequence[str],
     force: bool,
 ) -> Run:
     place = None if output is not None and Path(output) == path else output
-    estimated = estimate(path, estimators, declination=declination, output=place, force=force)
+    estimated = estimate(path, estimators, declination=declination, topics=topics, output=place, force=force)
     try:
         analyzed = analyze(
             Path(estimated.output),
@@ -161,6 +165,7 @@ def _run_on_mcap(
             start=options.start_s,
             end=options.end_s,
             exclude=options.exclude_s,
+            topics=topics,
         )
     except InputError as error:
         return Run(None, estimated, None, (str(error),))
