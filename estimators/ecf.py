@@ -14,7 +14,7 @@ interval. What flight needs beyond (3), and what switches it off:
 * ``heading_only``: the field turns the estimate about the vertical alone, by the sine of the heading error, so that a
   wrong dip or a disturbed field does not tilt it. False: as (3) stands, m0 being the first field.
 * ``gate``: the force enters as f/g, whose mean is right however hard one shakes, and counts 1 / (1 + (a / gate)^2)
-  where a is the acceleration of the last ``motion_s``. inf: f/|f|, always.
+  where a is the acceleration of the last ``motion_s``, less what is shorter than ``smooth_s``. inf: f/|f|, always.
 * ``mag_gate``: a field whose length is off the usual one by a share x counts 1 / (1 + (x / mag_gate)^2). inf: always.
 * ``ki_start``, ``start_gain``: where the log does not begin at rest, w_mes and ki are larger, and accelerations doubted
   less, for about ``settle_s``. Both 0, or a rest at the start: (1) and (2).
@@ -32,6 +32,9 @@ from .parameters import MargParameters, choice, quantity
 from .registry import Estimator
 from .runs import each_run
 
+SMALLEST_FIELD = 1e-12
+"""Tesla: less than any magnetometer resolves."""
+
 
 @dataclass(frozen=True)
 class Parameters(MargParameters):
@@ -42,9 +45,10 @@ class Parameters(MargParameters):
     ki_start: float = quantity(0.1, "1/s^2", "added to ki while a bias settles that no rest has shown")
     start_gain: float = quantity(2.0, "", "added to the factor on w_mes meanwhile, from 1")
     settle_s: float = quantity(30.0, "s", "time constant of that", minimum=1e-3)
-    k_acc: float = quantity(0.2, "", "weight of the accelerometer")
+    k_acc: float = quantity(0.25, "", "weight of the accelerometer")
     k_mag: float = quantity(0.1, "", "weight of the magnetometer")
-    gate: float = quantity(2.5, "m/s^2", "recent acceleration at which the accelerometer counts half", minimum=1e-6)
+    gate: float = quantity(2.0, "m/s^2", "recent acceleration at which the accelerometer counts half", minimum=1e-6)
+    smooth_s: float = quantity(0.1, "s", "what is shorter is vibration, not acceleration", minimum=1e-6)
     motion_s: float = quantity(0.5, "s", "how long an acceleration counts as recent", minimum=1e-3)
     mag_gate: float = quantity(
         0.05, "", "relative difference from the usual field at which it counts half", minimum=1e-6
@@ -67,19 +71,29 @@ def run(recording: Recording, parameters: Parameters) -> Estimate:
             parameters.ki,
             parameters.ki_start,
             parameters.start_gain,
+            min(parameters.settle_s, parameters.smooth_s, parameters.motion_s),
             1.0 / parameters.settle_s,
             parameters.k_acc,
             parameters.k_mag,
             GRAVITY,
             1.0 / parameters.gate**2,
             1.0 / parameters.motion_s,
+            1.0 / parameters.smooth_s,
             1.0 / parameters.mag_gate**2,
             1.0 / parameters.mag_memory_s,
             m0,
             parameters.heading_only,
         )
-        per_usual = 1.0 / math.hypot(*start.field) if start.field else 0.0
-        return constants, (start.orientation, start.bias, 0.0, per_usual, float(math.isnan(start.bias_sigma)))
+        first = start.field or (inputs.field[0].tolist() if inputs.has_mag else None)
+        per_usual = 1.0 / max(math.hypot(*first), SMALLEST_FIELD) if first else 0.0
+        return constants, (
+            start.orientation,
+            start.bias,
+            (0.0, 0.0, 0.0),
+            0.0,
+            per_usual,
+            float(math.isnan(start.bias_sigma)),
+        )
 
     each_run(inputs, ecf_kernel.run, begin, output, mag=True)
     return result("ecf", inputs, dict(zip(("orientation", "angular_velocity", "gyro_bias"), output, strict=True)))

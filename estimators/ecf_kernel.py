@@ -21,9 +21,9 @@ from ..geometry.kernels import (
 from ..schemas.estimate import Status
 from .loop_kernel import Floats, Span, Times, march
 
-State = tuple[Quaternion, Vector, float, float, float]
-"""Attitude, bias, recent acceleration over the gate squared, one over the usual field's length (0: not known), and
-what is left of the settling, from 1 to 0."""
+State = tuple[Quaternion, Vector, Vector, float, float, float]
+"""Attitude; bias; horizontal acceleration without vibration; its recent square, over the gate's; one over the usual
+field's length; what is left of the settling, from 1 to 0."""
 Output = tuple[Floats, Floats, Floats]
 
 ACCELEROMETER_REJECTED = int(Status.ACCELEROMETER_REJECTED)
@@ -41,12 +41,14 @@ class Constants(NamedTuple):
     ki: float
     ki_start: float
     start_gain: float
+    briefest_s: float
     settle_rate: float
     k_acc: float
     k_mag: float
     gravity: float
     gate: float
     motion_rate: float
+    smooth_rate: float
     mag_gate: float
     forget: float
     m0: Vector
@@ -58,33 +60,44 @@ def step(
     c: Constants, state: State, dt: float, rate: Vector, force: Vector, dt_mag: float, field: Vector
 ) -> tuple[State, Vector, int]:
     """Sample k: w_mes from the attitude of k - 1, then R_k = R_k-1 Exp((gyro - b + kp w_mes) dt)."""
-    q, b, motion, per_usual, settling = state
+    q, b, pull, motion, per_usual, settling = state
     flags = 0
     rotation = matrix(q)
     up = (rotation[6], rotation[7], rotation[8])  # v_hat of gravity: R^T e_z
-    boost = 1.0 + c.start_gain * settling
+    boost, ki, doubt = 1.0, c.ki, 1.0
+    brief = dt if dt < c.briefest_s else c.briefest_s  # for the low-passes, which must not overshoot
+    if settling > 1e-4:
+        boost, ki, doubt = 1.0 + c.start_gain * settling, c.ki + c.ki_start * settling, 1.0 - settling * settling
+        settling -= settling * c.settle_rate * brief
+    e = cross(force, up)  # as long as the horizontal force
     if c.gate > 0.0:
-        weight = boost * c.k_acc * dt / (c.gravity * (1.0 + motion * (1.0 - settling * settling)))
-        x, y, z = force[0] - c.gravity * up[0], force[1] - c.gravity * up[1], force[2] - c.gravity * up[2]
-        moved = min(x * x + y * y + z * z, SHOCK * c.gravity * c.gravity) * c.gate
-        motion += min(c.motion_rate * dt, 1.0) * (moved - motion)
+        weight = boost * c.k_acc * dt / (c.gravity * (1.0 + motion * doubt))
+        smooth = c.smooth_rate * brief
+        pull = (
+            pull[0] + smooth * (e[0] - pull[0]),
+            pull[1] + smooth * (e[1] - pull[1]),
+            pull[2] + smooth * (e[2] - pull[2]),
+        )
+        square = pull[0] * pull[0] + pull[1] * pull[1] + pull[2] * pull[2]
+        moved = min(square, SHOCK * c.gravity * c.gravity) * c.gate
+        motion += c.motion_rate * brief * (moved - motion)
         if motion > DROWNED:
             flags |= ACCELEROMETER_REJECTED
     else:
         length = norm(force)
         weight = boost * c.k_acc * dt / length if length > 0.0 else 0.0
-    e = cross(force, up)
     wx, wy, wz = weight * e[0], weight * e[1], weight * e[2]  # w_mes, times the interval of the sensor it comes from
     if dt_mag > 0.0:
         square = field[0] * field[0] + field[1] * field[1] + field[2] * field[2]
-        if square > 0.0 and (per_usual == 0.0 or c.mag_gate == 0.0):
-            per_usual = 1.0 / math.sqrt(square)
-        share = min(0.5 * (square * per_usual * per_usual - 1.0), 1.0)  # of the length, more than usual
-        odd = share * share * c.mag_gate
-        if odd > DROWNED:
-            flags |= MAGNETOMETER_REJECTED
-        weight = boost * c.k_mag * dt_mag * per_usual / (1.0 + odd)
-        per_usual -= per_usual * share * min(dt_mag * c.forget, 1.0)
+        if c.mag_gate > 0.0:
+            share = min(0.5 * (square * per_usual * per_usual - 1.0), 1.0)  # of the length, more than usual
+            odd = share * share * c.mag_gate
+            if odd > DROWNED:
+                flags |= MAGNETOMETER_REJECTED
+            weight = boost * c.k_mag * dt_mag * per_usual / (1.0 + odd)
+            per_usual -= per_usual * share * min(dt_mag * c.forget, 1.0)
+        else:
+            weight = boost * c.k_mag * dt_mag / math.sqrt(square) if square > 0.0 else 0.0
         if c.heading_only:
             f = turned(rotation, field)
             weight = weight * (f[0] * c.m0[1] - f[1] * c.m0[0])
@@ -94,16 +107,14 @@ def step(
         wx, wy, wz = wx + weight * e[0], wy + weight * e[1], wz + weight * e[2]
     u = (rate[0] - b[0], rate[1] - b[1], rate[2] - b[2])
     q = advance(renormalize(q), u[0] * dt + c.kp * wx, u[1] * dt + c.kp * wy, u[2] * dt + c.kp * wz)
-    ki = c.ki + c.ki_start * settling
     b = (b[0] - ki * wx, b[1] - ki * wy, b[2] - ki * wz)
-    settling -= settling * min(c.settle_rate * dt, 1.0)
-    return (q, b, motion, per_usual, settling), u, flags
+    return (q, b, pull, motion, per_usual, settling), u, flags
 
 
 @part
 def write(output: Output, k: int, c: Constants, state: State, u: Vector) -> None:
     orientation, angular_velocity, gyro_bias = output
-    q, b, _, _, _ = state
+    q, b, _, _, _, _ = state
     for i in range(4):
         orientation[k, i] = q[i]
     for i in range(3):

@@ -7,18 +7,23 @@ keeps unit norm and the covariance is three angles d in the world, R = Exp(d) R_
 
     q_k = q_k-1 * Exp(mean rate dt)                                                                (2.3, 2.4)
     d' = d - R dt b + noise,   P <- F P F^T + Q,  Q = [N_gyro^2, N_bias^2] dt                      (2.5, 2.18)
-    f_world / |f| = e_z + d x e_z + noise: two scalars, d_x and d_y, with unit rows                (2.6 to 2.8)
+    f_world / g = e_z - d x e_z + noise: two scalars, d_x and d_y, with unit rows                  (2.6 to 2.8)
     heading of m_world = declination: one scalar, d_z, with a unit row                             (2.12)
     K = P H^T (H P H^T + R)^-1, x += K (y - h), P -= K H P, one scalar after the other             (2.16 to 2.18)
 
 All noise is a density per root hertz and each step uses its own interval: N^2 dt to predict, N^2 / dt to measure, so
 that the result does not hang on the log's rate. What flight needs:
 
-* Linear acceleration is noise that lasts: ``acc_noise`` is its density (standard deviation times root of twice its
-  correlation time), not the sensor's. A force off gravity's length by x adds (``acc_excess`` x)^2.
+* Linear acceleration is noise that lasts: ``acc_noise`` is its density at best (standard deviation times root of twice
+  its correlation time), and ``acc_motion`` times the acceleration of the last ``motion_s`` is added (R. K. Mehra, On
+  the identification of variances and adaptive Kalman filtering, IEEE TAC 15(2), 1970, doi:10.1109/TAC.1970.1099422).
+  That acceleration is f_world / g - e_z without what is shorter than ``smooth_s`` and what the tilt's own variance
+  explains. f enters as f / g, not f / |f|: its mean is right however hard one shakes.
 * The field turns the heading alone, so neither dip nor disturbance tilts the estimate. A field off its usual length and
   dip adds noise, ``mag_excess`` times the relative difference; the usual field is learnt over ``mag_memory_s``.
-* A rate that changes between two samples adds noise: half the change, times ``rate_error``.
+* A rate that changes between two samples adds noise, its change times ``rate_error``; turning does, too: the rate times
+  ``scale_error``, for scale and misalignment. ``gyro_lag_s`` makes up for the delay of the gyro's own filters.
+* A heading beyond 5 sigma counts as one of 5; a field refused for 10 s on end is believed again.
 
 The innovations are the two tilt angles and the heading, rad. ``attitude_covariance`` and the state's are turned into
 the body; the state's first three are the correction just made.
@@ -57,13 +62,14 @@ class Noise(ImuParameters):
 
     gyro_lag_s: float = quantity(0.002, "s", "delay of the gyro's own filters, made up for")
     gyro_noise: float = quantity(0.0006, "rad/s/rtHz", "density of the gyro's noise")
-    bias_walk: float = quantity(0.00004, "rad/s/rts", "random walk of the gyro's bias")
+    bias_walk: float = quantity(0.0001, "rad/s/rts", "random walk of the gyro's bias")
     bias_sigma: float = quantity(0.02, "rad/s", "bias at the start, where no rest shows it")
     rate_error: float = quantity(0.1, "", "share of a step's rate change that is error")
     scale_error: float = quantity(0.003, "1/rtHz", "gyro noise per rad/s of turning: scale and misalignment")
     acc_noise: float = quantity(0.08, "m/s^2/rtHz", "density of linear acceleration", minimum=1e-9)
-    acc_motion: float = quantity(0.16, "1/rtHz", "more of it per m/s^2 of recent acceleration")
-    motion_s: float = quantity(1.0, "s", "how long an acceleration counts as recent", minimum=1e-3)
+    acc_motion: float = quantity(0.2, "1/rtHz", "more of it per m/s^2 of recent acceleration")
+    smooth_s: float = quantity(0.1, "s", "what is shorter is vibration, not acceleration", minimum=1e-6)
+    motion_s: float = quantity(0.8, "s", "how long an acceleration counts as recent", minimum=1e-3)
 
 
 @dataclass(frozen=True)
@@ -113,6 +119,7 @@ def _run(name: str, inputs: Inputs, noise: Noise, field: tuple[float, float, flo
             force_motion=noise.acc_motion**2,
             per_gravity=1.0 / GRAVITY,
             motion_rate=1.0 / noise.motion_s,
+            smooth_rate=1.0 / noise.smooth_s,
             field=mag_noise**2,
             field_excess=mag_excess**2,
             per_strength2=1.0 / strength2,
@@ -121,7 +128,7 @@ def _run(name: str, inputs: Inputs, noise: Noise, field: tuple[float, float, flo
         )
         none = (0.0, 0.0, 0.0)
         return constants, State(
-            start.orientation, start.bias, none, _covariance(start, noise), 0.0, level, vertical, 0.0
+            start.orientation, start.bias, none, _covariance(start, noise), none, 0.0, level, vertical, 0.0
         )
 
     each_run(inputs, run, begin, output, mag=True)

@@ -42,6 +42,7 @@ class Constants(NamedTuple):
     force_motion: float
     per_gravity: float
     motion_rate: float
+    smooth_rate: float
     field: float
     field_excess: float
     per_strength2: float
@@ -50,13 +51,15 @@ class Constants(NamedTuple):
 
 
 class State(NamedTuple):
-    """After a sample. ``motion`` is the recent mean square acceleration, in g^2; ``horizontal`` and ``vertical`` are
+    """After a sample. ``pull`` is the acceleration without vibration, ``motion`` its recent mean square, in g
+    and g^2, in the world; ``horizontal`` and ``vertical`` are
     the field that the filter has come to know; ``refused_s`` how long its heading has been an outlier."""
 
     q: Quaternion
     b: Vector
     rate: Vector
     P: Covariance
+    pull: Vector
     motion: float
     horizontal: float
     vertical: float
@@ -141,7 +144,7 @@ def angle(y: float, x: float) -> float:
 def step(
     c: Constants, state: State, dt: float, rate: Vector, force: Vector, dt_mag: float, field: Vector
 ) -> tuple[State, Report, int]:
-    q, b, before, P, motion, horizontal, vertical, refused_s = state
+    q, b, before, P, pull, motion, horizontal, vertical, refused_s = state
     flags = 0
 
     # 1. predict: the mean of the interval's rates turns the attitude
@@ -165,7 +168,11 @@ def step(
         rate_noise = c.gyro * per_s
         f = turned(R, force)
         tilt_x, tilt_y, lift = f[1] * c.per_gravity, -f[0] * c.per_gravity, f[2] * c.per_gravity - 1.0
-        moved = max(tilt_x * tilt_x + tilt_y * tilt_y + lift * lift - (prior[0] + prior[3]), 0.0)
+        smooth = min(c.smooth_rate * dt, 1.0)
+        east, north, up = pull
+        east, north, up = east + smooth * (tilt_y - east), north + smooth * (tilt_x - north), up + smooth * (lift - up)
+        pull = (east, north, up)
+        moved = max(east * east + north * north + up * up - (prior[0] + prior[3]), 0.0)
         motion += min(c.motion_rate * dt, 1.0) * (min(moved, SHOCK) - motion)
         noise_tilt = (c.force + c.force_motion * motion) * per_s
         if c.force_motion * motion > DROWNED * c.force:
@@ -203,4 +210,4 @@ def step(
     q = multiply(exponential(d[0], d[1], d[2]), q)
     b = (b[0] + d[3], b[1] + d[4], b[2] + d[5])
     report = Report((tilt_x, tilt_y, heading), prior, (noise_tilt, noise_tilt, noise_heading), d, rate_noise)
-    return State(q, b, rate, P, motion, horizontal, vertical, refused_s), report, flags
+    return State(q, b, rate, P, pull, motion, horizontal, vertical, refused_s), report, flags

@@ -67,7 +67,9 @@ def march(
                 newest = row
                 row += 1
             if newest >= 0:
-                dt_mag = min((mag_time_ns[newest] - mag_before) * 1e-9, mag_limit_s)
+                dt_mag = (mag_time_ns[newest] - mag_before) * 1e-9
+                if dt_mag > mag_limit_s:
+                    dt_mag = mag_limit_s
                 mag_before = mag_time_ns[newest]
                 m = (field[newest, 0], field[newest, 1], field[newest, 2])
                 lag = (now - mag_before) * 1e-9

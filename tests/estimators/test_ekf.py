@@ -13,7 +13,9 @@ from attlog.geometry import frames, quaternions
 
 PLAIN = "gyro_lag_s=0,scale_error=0,rate_error=0,acc_motion=0"
 """White noise of the densities given and nothing else: what the Monte Carlo simulates."""
-CONSTANTS = ekf_kernel.Constants(0.0, 1e-4, 1e-6, 0.0, 0.0, 1e-3, 0.0, 0.1, 1.0, 1e-3, 0.0, 1.0, 0.0, (0.0, 1.0))
+CONSTANTS = ekf_kernel.Constants(
+    **dict.fromkeys(ekf_kernel.Constants._fields, 0.0) | {"gyro": 1e-4, "bias_walk": 1e-6, "north": (0.0, 1.0)}  # type: ignore[arg-type]
+)
 
 
 def dense(a: Any, x: Any, b: Any) -> np.ndarray:
