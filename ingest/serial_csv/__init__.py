@@ -16,10 +16,9 @@ __all__ = ["csv_options", "read", "recognizes"]
 def recognizes(head: bytes) -> bool:
     """Whether a file that begins with ``head`` is a table of numbers: the least certain of all formats."""
     from .dialect import sniff
-    from .text import without_monitor_stamps
+    from .text import without_monitor_stamps, without_quotes
 
-    data, _ = without_monitor_stamps(np.frombuffer(head, np.uint8))
-    return sniff(data) is not None
+    return sniff(without_quotes(without_monitor_stamps(np.frombuffer(head, np.uint8)))) is not None
 
 
 def read(source: Source, options: IngestOptions | None = None) -> Ingested:

@@ -10,7 +10,7 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 from pyarrow import csv
 
-from .dialect import SAMPLE_BYTES, Dialect
+from .dialect import Dialect
 from .text import Bytes
 
 Mask = NDArray[np.bool_]
@@ -24,7 +24,6 @@ BILLIONTHS: Final = np.dtype("<m8[ns]")
 """How a column of exact decimals is marked: whole billionths of its unit."""
 _NUMBER: Final = r"^\s*$|(?i)^\s*[-+]?((\d+[.,]?\d*|[.,]\d+)([eE][-+]?\d+)?|nan|inf|ovf|null|none|n/a)\s*$"
 _INTEGER: Final = r"^\s*[-+]?\d{1,19}\s*$"
-_QUOTE: Final = ord('"')
 
 
 def numbers(data: Bytes, dialect: Dialect, exact: int | None, odd: list[int] | None = None) -> pa.Table:
@@ -81,7 +80,7 @@ def _read(data: Bytes, dialect: Dialect, kinds: list[Any], odd: list[int] | None
     types: Mapping[str, Any] = dict(zip(names, kinds, strict=True))
     parse_options = csv.ParseOptions(
         delimiter=dialect.delimiter.decode(),
-        quote_char='"' if np.any(data[:SAMPLE_BYTES] == _QUOTE) else False,
+        quote_char=False,
         ignore_empty_lines=odd is None,
         invalid_row_handler=None if odd is None else skip,
     )

@@ -29,6 +29,7 @@ _NUMBER: Final = rb"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|[-+]?(?:nan|inf|ov
 NUMBER: Final = re.compile(rb"\s*(?:" + _NUMBER + rb")?\s*", re.IGNORECASE)
 NUMBER_WITH_COMMA: Final = re.compile(rb"\s*(?:" + _NUMBER.replace(rb"\.", b",") + rb")?\s*", re.IGNORECASE)
 _WORD: Final = re.compile(r"[A-Za-z]")
+_WORDY: Final = re.compile(rb"[A-Za-df-z]")
 
 
 @dataclass(frozen=True)
@@ -125,16 +126,20 @@ def _mostly_text(values: Sequence[bytes], bare: Dialect) -> bool:
 
 
 def _header(lines: Sequence[bytes], bare: Dialect, width: int) -> tuple[tuple[str, ...], tuple[int, ...]]:
-    """The names of the columns and the numbers of the lines that give them: the first lines that may be a header."""
+    """The names of the columns and the numbers of the lines that give them: of the lines that may be a header that with
+    most known names, the first of equals. (A reset in the midst of a line runs half a sample into the header.)"""
+    found: list[tuple[int, tuple[str, ...], tuple[int, ...]]] = []
     for number, line in enumerate(lines):
-        cells = _cells(line, bare)
+        cells = _cells(line, bare) if _WORDY.search(line) else []
         if not _names_columns(cells, width):
             continue
         below = _cells(lines[number + 1], bare) if number + 1 < len(lines) else []
-        if not _is_names_or_units(below, bare, width):
-            return _fitted(cells, width), (number,)
-        return _joined(cells, below, width), (number, number + 1)
-    return (), ()
+        two = _is_names_or_units(below, bare, width)
+        names = _joined(cells, below, width) if two else _fitted(cells, width)
+        known = sum(meaning(name).quantity is not Quantity.OTHER for name in names)
+        found.append((known, names, (number, number + 1) if two else (number,)))
+    best = max(found, key=lambda candidate: candidate[0], default=(0, (), ()))
+    return best[1], best[2]
 
 
 def _cells(line: bytes, bare: Dialect) -> list[str]:

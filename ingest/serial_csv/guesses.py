@@ -1,5 +1,6 @@
 """What the numbers themselves say about units and columns, where nobody else does; and what each guess rests on."""
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
@@ -11,11 +12,13 @@ from .units import SCALES, G, Quantity
 
 Floats = NDArray[np.float64]
 
+_COUNTER: Final = re.compile(r"(?i)packet|count|index|sample|frame|seq|loop|iter|row|line|number|\bn[or]?\b|\bid\b|#")
 ROWS: Final = 200_000
 """Guesses look at no more than this many rows."""
 BLOCK_S: Final = 0.1
 USUAL_RATE_HZ: Final = 100.0
 MIN_CORRELATION: Final = 0.5
+OUTLIER: Final = 10.0
 EARTH_T: Final = 50e-6
 """Field strength that a magnetometer without a known unit is taken to have."""
 
@@ -123,18 +126,23 @@ def turning(time_s: Floats, accel: Floats, gyro: Floats) -> tuple[float, float]:
     size = max(1, round(BLOCK_S * n / span)) if span > 0 else 0
     if size == 0 or n < 20 * size:
         return 0.0, 0.0
-    blocks = [_block_means(values[:n], size) for values in (time_s[:, np.newaxis], accel, gyro)]
-    time, a, w = blocks
-    a = a / max(_usual_norm(a), 1e-300)
+    time, a, w = (_block_means(values[:n], size) for values in (time_s[:, np.newaxis], accel, gyro))
+    a = a / _usual_norm(a)
     change = np.diff(a, axis=0)
     expected = -np.cross(0.5 * (w[1:] + w[:-1]), 0.5 * (a[1:] + a[:-1])) * np.diff(time, axis=0)
-    good = np.isfinite(change).all(axis=1) & np.isfinite(expected).all(axis=1)
+    good = _usual(change) & _usual(expected)
     change, expected = change[good], expected[good]
-    power = float(np.sum(expected * expected))
-    if power <= 0.0 or not np.any(change):
+    power, both = float(np.sum(expected * expected)), float(np.sum(change * expected))
+    if not (power > 0.0 and np.any(change)):
         return 0.0, 0.0
-    both = float(np.sum(change * expected))
-    return both / power, both / float(np.sqrt(power * np.sum(change * change)))
+    return both / power, both / float(np.sqrt(power) * np.linalg.norm(change))
+
+
+def _usual(vectors: Floats) -> NDArray[np.bool_]:
+    """Rows (n,) that are finite and no longer than `OUTLIER` times what nine in ten are."""
+    length = np.linalg.norm(vectors, axis=1)
+    finite = np.isfinite(length)
+    return np.asarray(finite & (length <= OUTLIER * np.quantile(length[finite], 0.9))) if np.any(finite) else finite
 
 
 def _block_means(values: Floats, size: int) -> Floats:
@@ -188,6 +196,16 @@ def arrangement(columns: Sequence[Floats]) -> Arrangement | None:
     return Arrangement(time, accel, gyro, mag, because)
 
 
+def time_column(names: Sequence[str], columns: Sequence[NDArray[Any]]) -> tuple[int, Guess] | None:
+    """The first column, where it rises as a clock does, and neither is named nor steps as a counter."""
+    if not columns or columns[0].dtype == object or _COUNTER.search(names[0]):
+        return None
+    values = columns[0].astype(np.float64)
+    if not _rises(values) or bool(np.all(np.diff(values[:ROWS]) == 1.0)):
+        return None
+    return 0, Guess("time", f"column 1 ({names[0]})", "it is the first, and rises")
+
+
 def _rises(column: Floats) -> bool:
     steps = np.diff(column[:ROWS])
     return len(steps) > 1 and bool(np.mean(steps > 0) > 0.5) and bool(np.mean(steps >= 0) > 0.95)
@@ -206,5 +224,5 @@ def _is_gravity(triple: Floats) -> bool:
 
 def _spread(triple: Floats) -> float:
     norms = np.linalg.norm(triple[:ROWS], axis=1)
-    low, middle, high = np.nanpercentile(norms, (10, 50, 90))
+    low, middle, high = np.percentile(norms[np.isfinite(norms)], (10, 50, 90))
     return float((high - low) / middle)

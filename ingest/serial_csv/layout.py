@@ -127,8 +127,8 @@ def _said(units: Mapping[str, str], quantity: Quantity) -> str:
 
 def guessed(columns: Sequence[NDArray[Any]], names: Sequence[str], options: CsvOptions, source: str) -> Layout:
     """The layout by what the numbers look like; InputError where that does not tell."""
-    numbers = [column.astype(np.float64) for column in columns if column.dtype != object]
-    found = arrangement(numbers) if len(numbers) == len(columns) else None
+    numeric = [number for number, column in enumerate(columns) if column.dtype != object]
+    found = arrangement([columns[number].astype(np.float64) for number in numeric])
     if found is None:
         listed = f" (columns: {', '.join(names)})" if any(names) else ""
         raise InputError(
@@ -136,12 +136,12 @@ def guessed(columns: Sequence[NDArray[Any]], names: Sequence[str], options: CsvO
             "name them, as in --columns t_us,ax_g,ay_g,az_g,gx_dps,gy_dps,gz_dps"
         )
     groups = [
-        Group(quantity, 0, (start, start + 1, start + 2), _said(options.units, quantity))
+        Group(quantity, 0, tuple(numeric[start : start + 3]), _said(options.units, quantity))
         for quantity, start in ((Quantity.ACCEL, found.accel), (Quantity.GYRO, found.gyro), (Quantity.MAG, found.mag))
         if start is not None
     ]
     order = "".join(f", {g.quantity} from column {g.columns[0] + 1}" for g in groups)
-    clock = found.time if options.rate_hz is None else None
+    clock = numeric[found.time] if found.time is not None and options.rate_hz is None else None
     what = Guess("columns", f"{'time first' if found.time == 0 else 'no time'}{order}", found.because)
     own = tuple(name or f"column{number + 1}" for number, name in enumerate(names or [""] * len(columns)))
     return Layout(own, tuple(groups), clock, options.time_unit or "", (what,))

@@ -27,10 +27,9 @@ DAMAGED: Final = frozenset({GARBAGE, FIELDS, NOT_A_NUMBER})
 """Reasons that stand for a sample that was lost."""
 
 _CODE: Final[Mapping[str, int]] = {reason: code for code, reason in enumerate(REASONS)}
-_NUMERIC: Final = b'0123456789+-.eE, \t\r\n";' + b"nainfNAINFovOVulULoOE/"
+_NUMERIC: Final = b"0123456789+-.eE, \t\r\n;" + b"nainfNAINFovOVulULoOE/"
 _PRINTABLE: Final = bytes(range(32, 127)) + b"\t\r\n"
 _HIGH: Final = bytes(range(128, 256))
-_QUOTE: Final = ord('"')
 
 
 @dataclass(frozen=True)
@@ -53,16 +52,20 @@ def reason_of(line: bytes, dialect: Dialect) -> str:
     if plain.translate(None, _PRINTABLE + (_HIGH if words else b"")) or b"\r" in line.rstrip(b"\r"):
         return GARBAGE
     fields = dialect.split(line)
-    if len(fields) == dialect.fields:
-        return DATA if words or not plain.translate(None, _NUMERIC + dialect.delimiter) else TEXT
-    return FIELDS if any(dialect.number(field) and field.strip() for field in fields) else TEXT
+    numbers = sum(dialect.number(field) and bool(field.strip()) for field in fields)
+    if len(fields) != dialect.fields:
+        return FIELDS if numbers else TEXT
+    if words or not plain.translate(None, _NUMERIC + dialect.delimiter):
+        return DATA
+    return NOT_A_NUMBER if 2 * numbers > len(fields) else TEXT
 
 
 def classified(text: Text, dialect: Dialect) -> NDArray[np.uint8]:
     """For each line the position of its reason in `REASONS`; 0 is data."""
     words = any(dialect.is_text)
     known = _PRINTABLE + _HIGH if words else _NUMERIC + dialect.delimiter
-    suspect = _per_line(text, np.flatnonzero(_delimits(text, dialect))) + 1 != dialect.fields
+    delimiters = np.flatnonzero(text.data == ord(dialect.delimiter))
+    suspect = _per_line(text, delimiters) + 1 != dialect.fields
     suspect |= _per_line(text, _outside(text, known)) > 0
     suspect |= np.isin(text.data[text.starts], list(b"#%;/")) | _torn(text)
     result = np.zeros(len(text), np.uint8)
@@ -74,15 +77,11 @@ def classified(text: Text, dialect: Dialect) -> NDArray[np.uint8]:
 
 
 def _torn(text: Text) -> Mask:
-    """Lines (n,) with a carriage return in their midst, or with a quote that is not closed."""
-    torn = np.zeros(len(text), np.bool_)
-    if holds(text.data, RETURN):
-        at = np.flatnonzero(text.data == RETURN)
-        inner = at[text.data[at + 1] != NEWLINE]
-        torn |= _per_line(text, inner) > 0
-    if holds(text.data, _QUOTE):
-        torn |= _per_line(text, np.flatnonzero(text.data == _QUOTE)) % 2 == 1
-    return torn
+    """Lines (n,) with a carriage return in their midst."""
+    if not holds(text.data, RETURN):
+        return np.zeros(len(text), np.bool_)
+    at = np.flatnonzero(text.data == RETURN)
+    return np.asarray(_per_line(text, at[text.data[at + 1] != NEWLINE]) > 0)
 
 
 def _per_line(text: Text, at: Ints) -> Ints:
@@ -99,15 +98,3 @@ def _outside(text: Text, known: bytes) -> Ints:
     foreign = np.ones(256, np.bool_)
     foreign[list(known)] = False
     return np.flatnonzero(foreign[text.data])
-
-
-def _delimits(text: Text, dialect: Dialect) -> Mask:
-    """Where one field ends and the next begins; a delimiter within quotes is text."""
-    marks = text.data == ord(dialect.delimiter)
-    quotes = text.data == _QUOTE
-    if not np.any(quotes):
-        return np.asarray(marks)
-    before = np.cumsum(quotes)
-    at_start = (before - quotes)[text.starts]
-    lengths = text.ends + 1 - text.starts
-    return np.asarray(marks & ((before - np.repeat(at_start, lengths)) % 2 == 0))

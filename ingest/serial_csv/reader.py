@@ -18,11 +18,12 @@ from .arrival import fitted, rising
 from .channels import Rows, present
 from .clock import RESET, Stamps, stamps
 from .dialect import Dialect, sniff
+from .guesses import time_column
 from .layout import Layout, guessed, named, with_guess
 from .lines import Odd
 from .profile import checked
 from .table import Table, parse
-from .text import Bytes, Text, decoded, single_blanks, without_labels, without_monitor_stamps
+from .text import Bytes, Text, decoded, single_blanks, without_labels, without_monitor_stamps, without_quotes
 from .units import NANOSECONDS
 
 Ints = NDArray[np.int64]
@@ -37,6 +38,7 @@ SPOKEN: Final = 200
 """So many comments and boot messages become annotations."""
 
 
+@np.errstate(all="ignore")  # what overflows was printed so
 def ingest(source: Source, options: IngestOptions, line_ns: Ints | None = None) -> Ingested:
     """Read the file; InputError where it is no table, or where columns, units or clock cannot be told.
 
@@ -77,7 +79,7 @@ def ingest(source: Source, options: IngestOptions, line_ns: Ints | None = None) 
 def opened(source: Source) -> tuple[Dialect, Text]:
     """The dialect and the cleaned text of a file; InputError where it is no table of numbers."""
     data: Bytes = decoded(source.data)
-    data, _ = without_monitor_stamps(data)
+    data = without_quotes(without_monitor_stamps(data))
     dialect = sniff(data)
     if dialect is None:
         raise InputError(f"{source.name}: is no table of numbers (no lines of at least four, parted alike)")
@@ -103,6 +105,8 @@ def _clocked(
     """The rows that have a time and do not repeat the one before word for word, and their device time."""
     if csv.rate_hz is not None:
         return table, layout, times.at_rate(table, csv.rate_hz), 1
+    if layout.time is None and line_ns is None and (found := time_column(layout.names, table.columns)) is not None:
+        layout = with_guess(replace(layout, time=found[0]), found[1])
     if layout.time is None and line_ns is not None:
         return table, layout, rising(line_ns[table.line]), 1
     if layout.time is None:

@@ -18,7 +18,7 @@ RETURN: Final = 13
 TAB: Final = 9
 BLANK: Final = 32
 PART_BYTES: Final = 1 << 18
-LABEL: Final = re.compile(rb"^[ \t]*[A-Za-z_][\w .]*:[ \t]*[-+.\d]")
+LABEL: Final = re.compile(rb"^[ \t]*([A-Za-z_][\w .]*?)[ \t]*[:=][ \t]*[-+.\d]")
 MONITOR_STAMP: Final = re.compile(rb"^\d\d:\d\d:\d\d\.\d{3} -> ", re.MULTILINE)
 """What Arduino's serial monitor puts before each line."""
 
@@ -100,27 +100,34 @@ def single_blanks(data: Bytes) -> Bytes:
 
 
 def is_labelled(line: bytes, delimiter: bytes) -> bool:
-    """Whether every field is ``label:value``, as Arduino's serial plotter takes them."""
+    """Whether every field is ``label:value`` (or ``label=value``), as Arduino's serial plotter takes them."""
     fields = [field for field in line.split(delimiter) if field.strip()]
     return len(fields) > 1 and all(LABEL.match(field) for field in fields)
 
 
 def labels(line: bytes, delimiter: bytes) -> list[str]:
     """The labels of such a line."""
-    return [field.split(b":")[0].strip().decode("utf-8", "replace") for field in line.split(delimiter) if field.strip()]
+    matches = (LABEL.match(field) for field in line.split(delimiter) if field.strip())
+    return [match[1].decode("utf-8", "replace") for match in matches if match]
 
 
 def without_labels(data: Bytes, names: list[str]) -> Bytes:
     """The same lines with the values alone."""
-    plain = data.tobytes()
-    for name in sorted(names, key=len, reverse=True):
-        plain = plain.replace(name.encode() + b":", b"")
-    return np.frombuffer(plain, np.uint8)
+    spelled = b"|".join(re.escape(name.encode()) for name in sorted(names, key=len, reverse=True))
+    return np.frombuffer(re.sub(rb"\b(?:" + spelled + rb")[ \t]*[:=][ \t]*", b"", data.tobytes()), np.uint8)
 
 
-def without_monitor_stamps(data: Bytes) -> tuple[Bytes, bool]:
+def without_quotes(data: Bytes) -> Bytes:
+    """The lines without quotes, where most lines of the head have some."""
+    lines = data[:8192].tobytes().split(b"\n")
+    if 2 * sum(b'"' in line for line in lines) <= len(lines):
+        return data
+    return np.frombuffer(data.tobytes().translate(None, b'"'), np.uint8)
+
+
+def without_monitor_stamps(data: Bytes) -> Bytes:
     """The lines without what the serial monitor put before them, where it put it before most lines of the head."""
     head = data[:8192].tobytes()
-    if len(MONITOR_STAMP.findall(head)) * 2 < head.count(b"\n"):
-        return data, False
-    return np.frombuffer(MONITOR_STAMP.sub(b"", data.tobytes()), np.uint8), True
+    if 2 * len(MONITOR_STAMP.findall(head)) < head.count(b"\n") or not MONITOR_STAMP.search(head):
+        return data
+    return np.frombuffer(MONITOR_STAMP.sub(b"", data.tobytes()), np.uint8)

@@ -87,6 +87,15 @@ def test_no_time_and_no_rate_is_refused(read) -> None:
     assert len(read(text, rate_hz=50.0)["/imu0/data_raw"]) == 9
 
 
+def test_a_first_column_that_rises_is_taken_for_the_time(read) -> None:
+    result = read(lines("clk", range(0, 500, 10)))
+    assert result.time_ns()[1] == 10 * MS
+    assert "column 1 (clk)" in result.guesses[0]
+    for counter in (lines("PacketCounter", range(0, 500, 10)), lines("clk", range(50))):
+        with pytest.raises(InputError, match="--rate HZ"):
+            read(counter)
+
+
 @pytest.mark.parametrize("rate_hz", [0.0, -1.0])
 def test_rates_that_are_none(read, rate_hz: float) -> None:
     with pytest.raises(UsageError, match="not above 0"):

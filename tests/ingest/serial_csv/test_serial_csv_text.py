@@ -35,6 +35,7 @@ WAYS = {
     "BOM": "\ufeff" + PLAIN,
     "no last newline": PLAIN[:-1],
     "quoted header": PLAIN.replace(HEADER, ",".join(f'"{name}"' for name in HEADER.split(","))),
+    "quoted values": "\n".join(",".join(f'"{cell}"' for cell in line.split(",")) for line in PLAIN.splitlines()) + "\n",
     "commented header": "# " + PLAIN,
     "percent header": "%" + PLAIN,
     "trailing delimiter": PLAIN.replace("\n", ",\n"),
@@ -62,6 +63,12 @@ def test_labels_of_the_serial_plotter(read, expected) -> None:
     names = HEADER.split(",")
     lines = [", ".join(f"{n}:{v}" for n, v in zip(names, row.split(","), strict=True)) for row in ROWS]
     same(read("\n".join(lines)), expected)
+
+
+def test_names_and_equals_signs(read, expected) -> None:
+    names = HEADER.split(",")
+    lines = ["; ".join(f"{n} = {v}" for n, v in zip(names, row.split(","), strict=True)) for row in ROWS]
+    same(read("\n".join(["Free heap: 1234", *lines])), expected)
 
 
 def test_stamps_of_the_serial_monitor(read, expected) -> None:
@@ -105,6 +112,14 @@ def test_every_kind_of_bad_line_is_counted(read, expected) -> None:
     said = {note.text for note in result.whole.notes}
     assert {"# calibrated", "MPU init ok", "load:0x3fff0030,len:1184"} <= said
     assert completeness.bytes_read + completeness.bytes_skipped == completeness.bytes_total == len(text)
+
+
+def test_half_a_sample_that_runs_into_the_header(read, expected) -> None:
+    """The log begins in the midst of a line, and the device resets in the midst of another."""
+    text = "\n".join([f"5,0.0{HEADER}", f"0.1,0.2{HEADER}", HEADER, *ROWS[:20], f"200,0.0{HEADER}", *ROWS[20:]])
+    result = read(text)
+    same(result, expected)
+    assert sum(result.dropped.values()) == 4
 
 
 def test_values_that_are_not_there_leave_their_channel_out(read) -> None:

@@ -65,6 +65,13 @@ def test_columns_without_names_are_found_by_what_they_do(read, table, motion, or
     assert "columns: guessed" in result.guesses[0]
 
 
+def test_words_between_columns_without_names_are_no_hindrance(read, table, motion) -> None:
+    rows = table(None, motion.time_s * 1000, motion.force / G, np.degrees(motion.rate)).splitlines()
+    result = read("\n".join(f"IMU,{row},ok" for row in rows))
+    np.testing.assert_allclose(result.rate(), motion.rate, rtol=1e-6, atol=1e-6)
+    assert result["/csv/log"]["column1"][0] == b"IMU"
+
+
 def test_strict_takes_no_guess_and_says_what_is_missing(read, table, motion) -> None:
     text = table(NAMES, motion.time_s, motion.force / G, np.degrees(motion.rate))
     with pytest.raises(InputError, match=r"--strict.*time.*accelerometer.*gyroscope"):
