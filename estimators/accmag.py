@@ -47,14 +47,14 @@ def run(recording: Recording, parameters: Parameters) -> Estimate:
 
 def triads(force: Floats, field: Floats, declination: float) -> tuple[Floats, NDArray[np.bool_]]:
     """Body-to-world matrices (n, 3, 3) of forces and fields (n, 3); identity, and False, where no frame fits."""
-    with np.errstate(invalid="ignore", divide="ignore"):
+    with np.errstate(all="ignore"):
         up = force / np.linalg.norm(force, axis=1, keepdims=True)
         east = np.cross(field, up)
         good = np.linalg.norm(east, axis=1) > 1e-6 * np.linalg.norm(field, axis=1)
         east = east / np.linalg.norm(east, axis=1, keepdims=True)
-    north = np.cross(up, east)
-    c, s = math.cos(declination), math.sin(declination)
-    frames = np.stack([c * east + s * north, c * north - s * east, up], axis=1)
+        north = np.cross(up, east)
+        c, s = math.cos(declination), math.sin(declination)
+        frames = np.stack([c * east + s * north, c * north - s * east, up], axis=1)
     frames[~good] = np.eye(3)
     return frames, good
 

@@ -62,7 +62,7 @@ class Noise(ImuParameters):
 
     gyro_lag_s: float = quantity(0.002, "s", "delay of the gyro's own filters, made up for")
     gyro_noise: float = quantity(0.0006, "rad/s/rtHz", "density of the gyro's noise")
-    bias_walk: float = quantity(0.0001, "rad/s/rts", "random walk of the gyro's bias")
+    bias_walk: float = quantity(0.00015, "rad/s/rts", "random walk of the gyro's bias")
     bias_sigma: float = quantity(0.02, "rad/s", "bias at the start, where no rest shows it")
     rate_error: float = quantity(0.1, "", "share of a step's rate change that is error")
     scale_error: float = quantity(0.003, "1/rtHz", "gyro noise per rad/s of turning: scale and misalignment")
