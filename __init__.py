@@ -11,25 +11,39 @@ Conventions, everywhere in this package and said once here:
 * Attitude covariance and error: right error in the body, R = R_est Exp(d), rad^2.
 * Errors that a user can mend are `AttlogError`; their message says what, where and what to do next.
 
-The calls behind the command line's verbs (`convert`, `estimate`, `analyze`, `run`, `info`, `annotate`, `simulate`) take
-one log and return its result, or take a list of files, folders and globs and return the `Outcomes` of them all;
-`for_each` does the latter with a number of jobs. `recover` makes damaged MCAPs whole likewise, `record` takes one live
-source. `open` reads an MCAP.
+The calls behind the command line's verbs (`convert`, `estimate`, `analyze`, `run`, `info`, `annotate`, `align`,
+`export`, `simulate`) take one log and return its result, or take a list of files, folders and globs and return the
+`Outcomes` of them all; `for_each` does the latter with a number of jobs. `open` reads an MCAP.
 """
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .pipeline import analyze, annotate, convert, estimate, for_each, info, record, recover, run, simulate
+    from .pipeline import (
+        align,
+        analyze,
+        annotate,
+        convert,
+        estimate,
+        export,
+        for_each,
+        info,
+        record,
+        recover,
+        run,
+        simulate,
+    )
     from .schemas.errors import AttlogError, InputError, MissingSensorError, StorageError, UsageError
     from .storage import open
 
 _HOME = {
+    "align": ".pipeline",
     "analyze": ".pipeline",
     "annotate": ".pipeline",
     "convert": ".pipeline",
     "estimate": ".pipeline",
+    "export": ".pipeline",
     "for_each": ".pipeline",
     "info": ".pipeline",
     "record": ".pipeline",
@@ -51,10 +65,12 @@ __all__ = [
     "StorageError",
     "UsageError",
     "__version__",
+    "align",
     "analyze",
     "annotate",
     "convert",
     "estimate",
+    "export",
     "for_each",
     "info",
     "open",

@@ -49,6 +49,13 @@ SOURCE = _options(
     click.option("--normalize", is_flag=True, help="CSV: take quaternions that are not of unit norm."),
     click.option("--compression", type=click.Choice(["zstd", "lz4", "none"]), default="zstd", show_default=True),
 )
+TOPICS = click.option(
+    "--topic",
+    "topics",
+    multiple=True,
+    metavar="ROLE=TOPIC",
+    help="What another program's channel is, as in imu=/phone/imu, mag=…, reference=/vicon/pose, onboard_odom=/odom.",
+)
 ESTIMATE = _options(
     click.option(
         "-e",
@@ -59,11 +66,12 @@ ESTIMATE = _options(
         help="Estimator, as in ecf:imu=1,kp=0.5,as=soft; several times.  [default: ecf, ekf9 or ekf6, gyro]",
     ),
     click.option("--declination", type=float, help="Degrees, east positive; overrides what the log knows."),
+    TOPICS,
 )
 ANALYZE = _options(
     click.option(
         "--reference",
-        help="What to compare with: truth, onboard, or an attitude's name.  [default: truth, else onboard]",
+        help="Compare with truth, onboard, an attitude's name, or another MCAP.  [default: truth, else onboard]",
     ),
     click.option(
         "--align",
@@ -121,6 +129,7 @@ def estimate(
 @LOGS
 @COMMON
 @ANALYZE
+@TOPICS
 @click.option("--parquet", help="Also write the table to this Parquet file.")
 def analyze(
     logs: Sequence[str],
@@ -209,6 +218,44 @@ def annotate(
     if list_only and (at is not None or options["notes"] or options["remove"]):
         raise click.UsageError("--list goes without --at, --notes and --remove")
     _show(pipeline.for_each(pipeline.annotate, files, text, at=at, jobs=jobs, timeout_s=timeout, **options), as_json)
+
+
+@cli.command()
+@LOGS
+@COMMON
+@click.option(
+    "--reference",
+    help="Whose clock: truth, onboard, an attitude's name, or another MCAP.  [default: truth, else onboard]",
+)
+@click.option("--imu", type=click.IntRange(0), help="The gyro to align with.  [default: the first]")
+@click.option("--drift/--no-drift", default=True, show_default=True, help="Whether one clock may run faster.")
+@TOPICS
+def align(
+    logs: Sequence[str], jobs: int | None, timeout: float, as_json: bool, reference: str | None, **options: Any
+) -> None:
+    """Find and store how a reference's clock differs from the gyro's, in MCAPs."""
+    from . import pipeline
+
+    _show(pipeline.for_each(pipeline.align, logs, reference, jobs=jobs, timeout_s=timeout, **options), as_json)
+
+
+@cli.command()
+@LOGS
+@click.option("-o", "--output", help="Folder to write to; several logs get one each in it.  [default: beside the log]")
+@FORCE
+@JOBS
+@TIMEOUT
+@JSON
+@click.option("--format", type=click.Choice(["parquet", "csv"]), default="parquet", show_default=True)
+@click.option("--topic", "topics", multiple=True, metavar="GLOB", help="Only these topics; several times.")
+@click.option("--start", type=float, help="Seconds from the log's start.")
+@click.option("--end", type=float, help="Seconds from the log's start.")
+@click.option("--resample", metavar="TOPIC", help="Put every channel on this one's clock.")
+def export(logs: Sequence[str], jobs: int | None, timeout: float, as_json: bool, **options: Any) -> None:
+    """Write each channel of MCAPs to a Parquet or CSV file of its own."""
+    from . import pipeline
+
+    _show(pipeline.for_each(pipeline.export, logs, jobs=jobs, timeout_s=timeout, **options), as_json)
 
 
 @cli.command()

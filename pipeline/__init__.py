@@ -1,9 +1,11 @@
 """The calls behind the verbs of the command line."""
 
+from .align import align
 from .analyze import analyze
 from .annotate import annotate
 from .convert import convert
 from .estimate import estimate
+from .export import export
 from .info import info
 from .record import record
 from .recover import recover
@@ -11,4 +13,17 @@ from .run import run
 from .simulate import simulate
 from .verbs import for_each
 
-__all__ = ["analyze", "annotate", "convert", "estimate", "for_each", "info", "record", "recover", "run", "simulate"]
+__all__ = [
+    "align",
+    "analyze",
+    "annotate",
+    "convert",
+    "estimate",
+    "export",
+    "for_each",
+    "info",
+    "record",
+    "recover",
+    "run",
+    "simulate",
+]

@@ -18,7 +18,8 @@ class Verb(Generic[P, T]):
     """A call on one log. One log gives its result or raises; a list of files, folders and globs gives `Outcomes`.
 
     ``accepts`` says which files of a folder it takes; ``writes`` whether it has an ``output``; ``in_place`` whether
-    that is the log itself unless another is named; ``suffix`` is that of an output's name.
+    that is the log itself unless another is named; ``suffix`` is that of an output's name,
+    empty where the output is a folder.
     """
 
     def __init__(
@@ -53,6 +54,8 @@ class Verb(Generic[P, T]):
         """The argument that says where each file's result goes."""
         if not self.writes:
             return [{} for _ in files]
+        if not self.suffix and output is not None and len(files) == 1:
+            return [{"output": Path(output)}]
         places = files if self.in_place and output is None else outputs(files, output, self.suffix)
         return [{"output": place} for place in places]
 

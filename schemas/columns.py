@@ -2,13 +2,17 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .definition import MessageType
 from .passthrough import source_names
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import pyarrow as pa
 
 Time = NDArray[np.int64]
 """Integer nanoseconds, shape (n,)."""
@@ -57,6 +61,24 @@ class Columns:
     def select(self, index: Any) -> "Columns":
         """The messages that ``index`` (a slice, a mask or positions) picks."""
         return replace(self, time_ns=self.time_ns[index], data=self.data[index])
+
+    def to_numpy(self) -> NDArray[np.void]:
+        """A flat structured array (`frames_out.to_numpy`): ``time_ns``, ``angular_velocity.x``, …"""
+        from .frames_out import to_numpy
+
+        return to_numpy(self)
+
+    def to_arrow(self) -> "pa.Table":
+        """A flat Arrow table with units and the channel's metadata (`frames_out.to_arrow`)."""
+        from .frames_out import to_arrow
+
+        return to_arrow(self)
+
+    def to_pandas(self) -> "pd.DataFrame":
+        """A flat pandas frame, indexed by ``time_ns`` (`frames_out.to_pandas`)."""
+        from .frames_out import to_pandas
+
+        return to_pandas(self)
 
     def with_metadata(self, **entries: str) -> "Columns":
         """The same messages on a channel that says more about itself."""
