@@ -1,6 +1,7 @@
 """Arrays in body FLU, world ENU and SI to the columns of attlog's own channels, and back."""
 
 from collections.abc import Mapping
+from typing import cast
 
 import numpy as np
 from numpy.lib import recfunctions
@@ -10,6 +11,7 @@ from ..geometry.frames import rpy_ned_deg
 from .columns import Channel, Columns, Table, Time
 from .definition import MessageType
 from .estimate import Estimate
+from .fields import Fields
 from .messages import ATTITUDE, ATTITUDE_ESTIMATE, IMU, MAGNETIC_FIELD, NAV_SAT_FIX
 from .recording import Floats
 
@@ -140,8 +142,10 @@ def estimate_columns(estimate: Estimate, *, prefix: str = "", metadata: Mapping[
     for field in ATTITUDE_ESTIMATE.fields:
         if hasattr(estimate, field.name):
             fields[field.name] = getattr(estimate, field.name)
-    sequences = {field.name: fields[field.name].shape[1] for field in ATTITUDE_ESTIMATE.fields if field.length == 0}
-    data = table(ATTITUDE_ESTIMATE, fields, sequences)
+    for name, values in fields.items():
+        if isinstance(ATTITUDE_ESTIMATE[name].type, MessageType):
+            fields[name] = nested(ATTITUDE_ESTIMATE, name, values)
+    data = cast("Table", Fields(fields))
     about = {
         "estimator": estimate.estimator,
         "north": str(estimate.north),

@@ -1,12 +1,15 @@
 """Columns as complete Message records, put where the writer wants them."""
 
 import struct
+from collections.abc import Iterator
+from itertools import groupby
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..schemas.columns import Columns
+from ..schemas.fields import Fields
 from ..schemas.layout import CDR_LE, Layout, Path, Slot, dotted, layout
 from . import encode
 from .disassemble import disassemble, stamp_path, stamps
@@ -97,9 +100,23 @@ class FixedRows:
                 self._stamps.append(BODY + slot.offset)
             elif slot.dtype.kind == "S":
                 self._constant(slot, columns.channel.texts.get(dotted(slot.path, False), "").encode())
-        for first, size in _runs(columns.data, given):
-            source, dtype = _source(columns.data, first, size)
-            self._moves.append((BODY + first.offset, dtype, source))
+        for table, slots in self._tables(given):
+            for first, size in _runs(table, slots):
+                source, dtype = _source(table, first, size)
+                self._moves.append((BODY + first.offset, dtype, source))
+
+    def _tables(self, slots: list[Slot]) -> Iterator[tuple[NDArray[Any], list[Slot]]]:
+        """Structured arrays with the slots that they fill; what is the same for all messages goes to the template."""
+        data = self._ordered.columns.data
+        if not isinstance(data, Fields):
+            yield data, slots
+            return
+        for name, group in groupby(slots, key=lambda slot: slot.path[0]):
+            if data[str(name)].strides[0] == 0 and len(data):
+                for slot in group:
+                    self._constant(slot, _pick(data[:1], slot.path).astype(slot.dtype.base).tobytes())
+            else:
+                yield data.alone(str(name)), list(group)
 
     def _constant(self, slot: Slot, value: bytes) -> None:
         at = BODY + slot.offset
