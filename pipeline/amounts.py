@@ -22,7 +22,7 @@ def bytes_of(spelled: str) -> int:
 
 def _amount(spelled: str, units: "dict[str, float] | dict[str, int]", what: str) -> float:
     match = _AMOUNT.fullmatch(spelled)
-    unit = match[2].lower() if match else None
+    unit = match[2].lower() if match else "?"
     if match is None or unit not in units or float(match[1]) == 0:
         raise UsageError(f"{spelled!r} is no {what.removeprefix('a ')}")
     return float(match[1]) * float(units[unit])

@@ -48,7 +48,7 @@ def stretches(data: Bytes, path: Path) -> Iterator[Stretch]:
         size -= len(MAGIC)
     while at < size:
         end = scan.end_of(at)
-        if at < end <= size:
+        if at < end <= size and scan.fits(at, end, size):
             yield Stretch(What.RECORD, at, end, int(data[at]))
             at = end
             continue
@@ -86,6 +86,10 @@ class _Scan:
         except (InputError, struct.error):
             sound = not whole and op == Op.CHUNK and length < LARGEST
         return end if sound else at
+
+    def fits(self, at: int, end: int, size: int) -> bool:
+        """Whether a record that carries no mark of its own length is followed by another one."""
+        return self.data[at] != Op.MESSAGE or end == size or self.end_of(end) > end
 
     def next_after(self, at: int, size: int) -> int:
         """The next place where a record credibly begins, or the end of the file."""
@@ -148,17 +152,17 @@ def _message_index(content: Cursor, length: int, _whole: bool) -> bool:
 
 
 def _texts(count: int) -> Callable[[Cursor, int, bool], bool]:
-    def check(content: Cursor, _length: int, whole: bool) -> bool:
+    def check(content: Cursor, length: int, whole: bool) -> bool:
         for _ in range(count if whole else 0):
             content.text()
-        return True
+        return not whole or content.at == length
 
     return check
 
 
 def _parsed(read: Callable[[Cursor], object]) -> Callable[[Cursor, int, bool], bool]:
-    def check(content: Cursor, _length: int, whole: bool) -> bool:
-        return not whole or read(content) is not None
+    def check(content: Cursor, length: int, whole: bool) -> bool:
+        return not whole or (read(content) is not None and content.at == length)
 
     return check
 
@@ -171,11 +175,11 @@ def _attachment(content: Cursor, length: int, whole: bool) -> bool:
     return bool(not whole or content.at + size + 4 == length)
 
 
-def _metadata(content: Cursor, _length: int, whole: bool) -> bool:
+def _metadata(content: Cursor, length: int, whole: bool) -> bool:
     if whole:
         content.text()
         content.text_map()
-    return True
+    return not whole or content.at == length
 
 
 _CHECKS: Final[Mapping[int, Callable[[Cursor, int, bool], bool]]] = {
