@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from attlog.signals.envelope import Line, fit
 from attlog.ingest.dataflash.leap_seconds import utc_from_gps
 from attlog.schemas import Kind
+from attlog.signals.envelope import Line, fit
 
 SECOND = 1_000_000_000
 
