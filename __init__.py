@@ -13,27 +13,26 @@ Conventions, everywhere in this package and said once here:
 
 The calls behind the command line's verbs (`convert`, `estimate`, `analyze`, `run`, `info`, `annotate`, `align`,
 `export`, `simulate`) take one log and return its result, or take a list of files, folders and globs and return the
-`Outcomes` of them all; `for_each` does the latter with a number of jobs. `open` reads an MCAP.
+`Outcomes` of them all; `for_each` does the latter with a number of jobs. `recover` makes damaged MCAPs whole likewise,
+`record` takes one live source. `open` reads an MCAP.
 """
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .pipeline import (
-        align,
-        analyze,
-        annotate,
-        convert,
-        estimate,
-        export,
-        for_each,
-        info,
-        record,
-        recover,
-        run,
-        simulate,
-    )
+    from .pipeline.align import align
+    from .pipeline.analyze import analyze
+    from .pipeline.annotate import annotate
+    from .pipeline.convert import convert
+    from .pipeline.estimate import estimate
+    from .pipeline.export import export
+    from .pipeline.info import info
+    from .pipeline.record import record
+    from .pipeline.recover import recover
+    from .pipeline.run import run
+    from .pipeline.simulate import simulate
+    from .pipeline.verbs import for_each
     from .schemas.errors import AttlogError, InputError, MissingSensorError, StorageError, UsageError
     from .storage import open
 

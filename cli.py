@@ -284,6 +284,7 @@ def simulate(scenario: str, seed: int, output: str, force: bool, as_json: bool) 
 @click.pass_context
 def record(
     context: click.Context,
+    /,
     source: str,
     output: str,
     duration: str | None,
