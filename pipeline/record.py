@@ -1,5 +1,6 @@
 """A live source to one MCAP, or to a row of them."""
 
+import logging
 import subprocess
 import sys
 import time
@@ -35,6 +36,7 @@ PATIENCE_NS: Final = 400_000_000
 HEAD: Final = 1 << 17
 RATE_S: Final = 2.0
 UNITS: Final = {live.Kind.CSV: "line", live.Kind.MAVLINK: "message"}
+_log = logging.getLogger("attlog")
 _FINISH: Final = "import sys; from attlog.pipeline.finish import finish; finish(sys.argv[1])"
 
 
@@ -167,7 +169,7 @@ class _Recorder:
         self.finishing: list[subprocess.Popen[bytes]] = []
         self.writer: StreamWriter | None = None
         self.carry: list[Arrival] = []
-        self.head = b""
+        self.head = self.tail = b""
         self.bytes = self.bytes_before = 0
         self.began = self.file_began = time.monotonic()
         self.pace: list[tuple[float, int]] = []
@@ -177,6 +179,7 @@ class _Recorder:
         """Record until told to stop, or for as long as was asked."""
         self._check_target()
         self.receiver.start()
+        _log.info("recording %s", self.address)
         self.began = time.monotonic()
         try:
             while not (stop() or self._is_over()):
@@ -243,7 +246,8 @@ class _Recorder:
 
     def _line_end(self, event: Arrival) -> list[Arrival]:
         """A line that a lost link cut off is not to go on with the next one."""
-        cut = self.address.kind is live.Kind.CSV and self.carry and not self.carry[-1][1].endswith(b"\n")
+        last = self.carry[-1][1] if self.carry else self.tail
+        cut = self.address.kind is live.Kind.CSV and last and not last.endswith(b"\n")
         return [(event[0], b"\n", "")] if cut else []
 
     def _append(self, arrivals: list[Arrival]) -> None:
@@ -254,6 +258,7 @@ class _Recorder:
         self.bytes += sum(len(data) for _, data, _ in arrivals)
         if len(self.head) < HEAD:
             self.head += b"".join(data for _, data, _ in arrivals)
+        self.tail = next((data for _, data, _ in reversed(arrivals) if data), self.tail)
         self.writer.append([live.to_columns(arrivals)])
 
     def _sync(self) -> None:
