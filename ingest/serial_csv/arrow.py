@@ -1,5 +1,6 @@
 """Lines of data to columns by Arrow's CSV parser."""
 
+import re
 from collections.abc import Mapping
 from contextlib import suppress
 from typing import Any, Final, Literal
@@ -23,6 +24,7 @@ WORDS: Final = ["", "nan", "NaN", "NAN", "ovf", "OVF", "null", "NULL", "None", "
 BILLIONTHS: Final = np.dtype("<m8[ns]")
 """How a column of exact decimals is marked: whole billionths of its unit."""
 _NUMBER: Final = r"^\s*$|(?i)^\s*[-+]?((\d+[.,]?\d*|[.,]\d+)([eE][-+]?\d+)?|nan|inf|ovf|null|none|n/a)\s*$"
+_BAD_COLUMN: Final = re.compile(r"In CSV column #(\d+):")
 _INTEGER: Final = r"^\s*[-+]?\d{1,19}\s*$"
 
 
@@ -32,26 +34,34 @@ def numbers(data: Bytes, dialect: Dialect, exact: int | None, odd: list[int] | N
     Lines with another number of fields are skipped, and their numbers (from 0) put into ``odd``; an empty line is a row
     of nulls. ArrowInvalid where a value is no number, or without ``odd`` where a line has other fields.
     """
-    kinds: list[Any] = [pa.binary() if text else pa.float64() for text in dialect.is_text]
-    kind = _exact_kind(data, dialect, exact)
-    if exact is not None and kind is not None and not dialect.is_text[exact]:
-        kinds[exact] = kind
-    return _read(data, dialect, kinds, odd)
+    return _read(data, dialect, _kinds(data, dialect, exact), odd)
 
 
 def checked(data: Bytes, dialect: Dialect, exact: int | None) -> tuple[tuple[NDArray[Any], ...], Mask]:
-    """All columns as text first, so that only the rows with something else than a number are lost; which (n,) are good.
+    """The same, but only the rows with something else than a number are lost; which (n,) are good.
 
-    ArrowInvalid where the lines have not all the same number of fields.
+    A column in which Arrow finds such a thing is read again as text. ArrowInvalid where the lines have not all the same
+    number of fields.
     """
-    table = _read(data, dialect, [pa.string()] * dialect.fields, None)
+    kinds = _kinds(data, dialect, exact)
+    table = None
+    while table is None:
+        try:
+            table = _read(data, dialect, kinds, None)
+        except pa.ArrowInvalid as error:
+            match = _BAD_COLUMN.search(str(error))
+            if match is None or kinds[int(match[1])] == pa.string():
+                raise
+            kinds[int(match[1])] = pa.string()
+    doubtful = [number for number, kind in enumerate(kinds) if kind == pa.string()]
     good = np.ones(len(table), np.bool_)
-    for column, is_text in zip(table.columns, dialect.is_text, strict=True):
-        if not is_text:
-            good &= pc.match_substring_regex(column, _NUMBER).to_numpy()
+    for number in doubtful:
+        good &= pc.match_substring_regex(table.column(number), _NUMBER).to_numpy()
     table = table.filter(pa.array(good))
-    kinds = enumerate(zip(table.columns, dialect.is_text, strict=True))
-    return tuple(_converted(column, dialect, is_text, number == exact) for number, (column, is_text) in kinds), good
+    columns = list(arrays(table))
+    for number in doubtful:
+        columns[number] = _converted(table.column(number), dialect, number == exact)
+    return tuple(columns), good
 
 
 def arrays(table: pa.Table) -> tuple[NDArray[Any], ...]:
@@ -97,6 +107,14 @@ def _read(data: Bytes, dialect: Dialect, kinds: list[Any], odd: list[int] | None
     return csv.read_csv(reader, read_options, parse_options, convert_options)
 
 
+def _kinds(data: Bytes, dialect: Dialect, exact: int | None) -> list[Any]:
+    kinds: list[Any] = [pa.binary() if text else pa.float64() for text in dialect.is_text]
+    kind = _exact_kind(data, dialect, exact)
+    if exact is not None and kind is not None and not dialect.is_text[exact]:
+        kinds[exact] = kind
+    return kinds
+
+
 def _exact_kind(data: Bytes, dialect: Dialect, exact: int | None) -> Any:
     """int64 for whole numbers, a decimal for stamps of more digits than a double holds, else None."""
     if exact is None:
@@ -120,9 +138,8 @@ def _nanoseconds(column: Any) -> NDArray[Any]:
     return np.ascontiguousarray(halves[:, 0]).view(BILLIONTHS)
 
 
-def _converted(column: Any, dialect: Dialect, is_text: bool, exact: bool) -> NDArray[Any]:
-    if is_text:
-        return np.asarray(column.cast(pa.binary()).to_numpy())
+def _converted(column: Any, dialect: Dialect, exact: bool) -> NDArray[Any]:
+    """Texts that are all numbers, or words for none, as numbers."""
     plain = pc.utf8_trim_whitespace(pc.replace_substring(column, dialect.decimal.decode(), "."))
     if exact and pc.all(pc.match_substring_regex(plain, _INTEGER)).as_py():
         with suppress(pa.ArrowInvalid):  # beyond 64 bits

@@ -68,10 +68,11 @@ def _quick(text: Text, dialect: Dialect, exact: int | None) -> Table | None:
     if before is None or largest(text.data) > 0x7E:
         return None
     data = text.data[sum(len(line.text) + 1 for line in before) :]
-    lines, skipped = count(data, ord("\n")), list[int]()
-    try:
-        table = arrow.numbers(data, dialect, exact, skipped)
-    except pa.ArrowInvalid:
+    lines = count(data, ord("\n"))
+    table, skipped = _attempt(data, dialect, exact)
+    if table is None and (muted := _muted(data, before, dialect.delimiter)) is not None:
+        table, skipped = _attempt(muted, dialect, exact)
+    if table is None:
         return None
     empty = arrow.empty_rows(table)
     if len(table) + len(skipped) != lines or len(skipped) > MOST_ODD * lines:
@@ -85,6 +86,24 @@ def _quick(text: Text, dialect: Dialect, exact: int | None) -> Table | None:
         return None
     row_bytes = (len(data) - sum(len(one.text) + 1 for one in odd)) / max(len(line), 1)
     return Table(arrow.arrays(table), line + len(before), lines + len(before), (*before, *odd), row_bytes)
+
+
+def _attempt(data: Bytes, dialect: Dialect, exact: int | None) -> tuple[pa.Table | None, list[int]]:
+    """The table, or None where a value is no number, and the numbers of the lines that were skipped."""
+    skipped: list[int] = []
+    try:
+        return arrow.numbers(data, dialect, exact, skipped), skipped
+    except pa.ArrowInvalid:
+        return None, skipped
+
+
+def _muted(data: Bytes, before: list[Odd], delimiter: bytes) -> Bytes | None:
+    """The same bytes, but where a header stands again it has one field: a device that resets prints it again. None
+    where it does not."""
+    plain = whole = data.tobytes()
+    for header in (line.text for line in before if line.reason == HEADER):
+        plain = plain.replace(b"\n" + header + b"\n", b"\n" + header.replace(delimiter, b"~") + b"\n")
+    return None if plain is whole or plain == whole else np.frombuffer(plain, np.uint8)
 
 
 def _before_data(data: Bytes, dialect: Dialect) -> list[Odd] | None:
@@ -113,13 +132,9 @@ def _careful(text: Text, dialect: Dialect, exact: int | None) -> Table:
     line = np.flatnonzero(codes == 0)
     columns: tuple[NDArray[Any], ...] = tuple(np.zeros(0) for _ in range(dialect.fields))
     if len(line):
-        data = text.only(codes == 0)
-        try:
-            columns = arrow.arrays(arrow.numbers(data, dialect, exact))
-        except pa.ArrowInvalid:
-            columns, good = arrow.checked(data, dialect, exact)
-            codes[line[~good]] = REASONS.index(NOT_A_NUMBER)
-            line = line[good]
+        columns, good = arrow.checked(text.only(codes == 0), dialect, exact)
+        codes[line[~good]] = REASONS.index(NOT_A_NUMBER)
+        line = line[good]
     odd = tuple(Odd(n, REASONS[codes[n]], text.line(n)) for n in np.flatnonzero(codes).tolist())
     row_bytes = (len(text.data) - sum(len(one.text) + 1 for one in odd)) / max(len(line), 1)
     return Table(columns, line, len(text), odd, row_bytes)
