@@ -43,8 +43,8 @@ class Text:
         return len(self.ends)
 
     def line(self, number: int) -> bytes:
-        """One line, without its line end."""
-        return self.data[self.starts[number] : self.ends[number]].tobytes().rstrip(b"\r")
+        """One line, without its newline."""
+        return self.data[self.starts[number] : self.ends[number]].tobytes()
 
     def only(self, kept: NDArray[np.bool_]) -> Bytes:
         """The bytes of the lines (n,) that are kept."""

@@ -112,6 +112,9 @@ def test_every_kind_of_bad_line_is_counted(read, expected) -> None:
     said = {note.text for note in result.whole.notes}
     assert {"# calibrated", "MPU init ok", "load:0x3fff0030,len:1184"} <= said
     assert completeness.bytes_read + completeness.bytes_skipped == completeness.bytes_total == len(text)
+    lost = [line for line in text.split(b"\n") if line not in (b"", b"# calibrated", HEADER.encode())]
+    kept = {line.encode() for line in ROWS}
+    assert completeness.bytes_skipped == sum(len(line) + 1 for line in lost if line not in kept)
 
 
 def test_half_a_sample_that_runs_into_the_header(read, expected) -> None:
