@@ -35,7 +35,7 @@ from .coarse import candidates
 from .turning import Floats, Mask, Turning
 
 LONGEST_WINDOW_S: Final = 0.4
-LEAST_CORRELATION: Final = 0.5
+LEAST_CORRELATION: Final = 0.7
 LARGEST_SIGMA_S: Final = 0.1
 LEAST_INTERVALS: Final = 30
 LEAST_RATE: Final = 0.01

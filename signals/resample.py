@@ -22,7 +22,8 @@ def linear(time_ns: Times, values: Floats, at_ns: Times) -> Floats:
     before, after, part = bracket(time_ns, at_ns)
     part = part.reshape(-1, *[1] * (values.ndim - 1))
     low, high = values[before], values[after]
-    blend = low + (high - low) * part
+    with np.errstate(invalid="ignore"):
+        blend = low + (high - low) * part
     return np.asarray(np.where(part == 0.0, low, np.where(part == 1.0, high, blend)))
 
 
