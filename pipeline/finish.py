@@ -9,9 +9,10 @@ from .. import storage
 from ..ingest import live
 from ..ingest.live import options as said
 from ..schemas.columns import Columns
-from ..schemas.errors import AttlogError
+from ..schemas.errors import StorageError
 from ..schemas.source import IngestOptions
 from ..storage.writer import is_derived
+from .batch import describe
 from .bodies import bodies_columns
 from .convert import completeness_text, finding_lines, ingested_recordings, metadata_records, segment_lines, summary
 from .findings import both
@@ -75,8 +76,10 @@ def finish(path: str | Path, options: IngestOptions | None = None) -> RecordedFi
     about = metadata[RECORDING]
     try:
         return _finished(place, stream, metadata, options or said.from_text(about["options"]))
-    except (AttlogError, ValueError) as error:
-        about = about | {DECODED: f"no: {error}"}
+    except StorageError:
+        raise
+    except Exception as error:  # whatever it is, what was recorded is safe, and how to go on is told
+        about = about | {DECODED: f"no: {describe(str(place), error)}"}
         storage.annotate(place, metadata={RECORDING: about})
         return described(place)
 

@@ -1,5 +1,6 @@
 """A live source to one MCAP, or to a row of them."""
 
+import glob
 import logging
 import subprocess
 import sys
@@ -273,7 +274,10 @@ class _Recorder:
 
     def _check_target(self) -> None:
         first = self._path(1)
-        if first.exists() and not self.force:
+        numbered = first.parent.glob(f"{glob.escape(self.target.stem)}_[0-9][0-9][0-9][0-9].mcap")
+        there = sorted(numbered) if self.limits.rotates else [first] * first.exists()
+        if there and not self.force:
+            first = there[0]
             raise StorageError(
                 f"{first}: exists already; choose another name, or overwrite it with --force (force=True)"
             )

@@ -245,6 +245,21 @@ def test_killed_a_few_times_it_misses_the_last_second_at_most(start: Start, tmp_
     kill_often(start, tmp_path, 5)
 
 
+@pytest.mark.parametrize("delay_s", [0.05, 0.4, 0.8])
+def test_killed_while_it_finishes(start: Start, terminal: Terminal, tmp_path: Path, delay_s: float) -> None:
+    process = start(f"serial:{terminal.name}:115200", "-o", "imu.mcap")
+    os.write(terminal.master, HEADER)
+    terminal.print(0, 1000, 1000.0)
+    time.sleep(0.3)
+    process.send_signal(signal.SIGTERM)
+    time.sleep(delay_s)
+    process.kill()
+    process.communicate()
+    counts = official(Path(attlog.recover(tmp_path / "imu.mcap").output))
+    assert counts["/imu0/data_raw"] == 1000
+    assert counts["/recording/stream"] > 1
+
+
 @pytest.mark.long
 def test_killed_50_times_it_misses_the_last_second_at_most(start: Start, tmp_path: Path) -> None:
     kill_often(start, tmp_path, 50)
@@ -264,6 +279,12 @@ def test_rotation_by_time_keeps_every_line_and_the_header(start: Start, terminal
         assert path.name in out
         with attlog.open(path) as log:
             assert np.allclose(log["/imu0/data_raw"]["linear_acceleration"]["z"], 9.80665)
+
+
+def test_no_file_of_a_row_is_overwritten_unasked(tmp_path: Path) -> None:
+    (tmp_path / "imu_0003.mcap").write_bytes(b"mine")
+    with pytest.raises(attlog.StorageError, match="imu_0003"):
+        attlog.record(f"mavlink:udpin:127.0.0.1:{free_port()}", tmp_path / "imu.mcap", rotate_s=1.0, duration_s=0.1)
 
 
 def test_rotation_by_size(start: Start, tmp_path: Path) -> None:
