@@ -374,9 +374,9 @@ def _span(spelled: str) -> tuple[float, float]:
 
 
 def _print(result: Any, as_json: bool) -> None:
-    import json
+    from .pipeline.outcomes import as_json as json_of
 
-    click.echo(json.dumps(result.to_dict(), indent=2) if as_json else result.to_text())
+    click.echo(json_of(result.to_dict()) if as_json else result.to_text())
 
 
 def _show(outcomes: "Outcomes[Any]", as_json: bool) -> None:

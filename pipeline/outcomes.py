@@ -1,6 +1,5 @@
 """What became of each log of a call."""
 
-import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Generic, Protocol, TypeVar, overload
@@ -79,7 +78,14 @@ class Outcomes(Sequence[Outcome[T]]):
 
     def to_json(self) -> str:
         """One JSON array with an object for each log, failed ones included."""
-        return json.dumps([_as_dict(outcome) for outcome in self.outcomes], indent=2, allow_nan=False)
+        return as_json([_as_dict(outcome) for outcome in self.outcomes])
+
+
+def as_json(told: Any) -> str:
+    """JSON, indented; a number that does not exist (NaN, infinity) is null."""
+    import orjson
+
+    return orjson.dumps(told, option=orjson.OPT_INDENT_2 | orjson.OPT_SERIALIZE_NUMPY, default=str).decode()
 
 
 def _as_dict(outcome: Outcome[Any]) -> dict[str, Any]:

@@ -11,7 +11,8 @@ from typing import Any
 import pytest
 
 from attlog.pipeline.batch import run_all
-from attlog.schemas import UsageError
+from attlog.pipeline.outcomes import as_json
+from attlog.schemas import Kind, Severity, UsageError
 
 WORKERS = """
 import os, time
@@ -80,3 +81,8 @@ def test_a_wrong_option_is_no_logs_fault() -> None:
 def test_json_has_an_object_for_each_log(work: Any) -> None:
     told = json.loads(run_all(_tasks(work, "fine", "bad"), jobs=1).to_json())
     assert told == [{"source": "fine0", "text": "fine0"}, {"source": "bad1", "error": "bad1: no good"}]
+
+
+def test_json_has_no_number_that_json_does_not_know() -> None:
+    told = as_json({"value": float("nan"), "rate": float("inf"), "level": Severity.WARN, "kind": Kind.GAP})
+    assert json.loads(told) == {"value": None, "rate": None, "level": 30, "kind": "gap"}
