@@ -39,5 +39,10 @@ bench: $(BIN)/python
 	$(BIN)/python -m pip install --quiet ".[peers]"
 	$(BIN)/python -m benchmarks
 
+docs: $(BIN)/python
+	rm -rf build/lib
+	$(BIN)/python -m pip install --quiet ".[docs]"
+	$(BIN)/mkdocs build --strict
+
 clean:
 	rm -rf build .venv *.egg-info
