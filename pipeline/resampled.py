@@ -31,6 +31,8 @@ def resampled(columns: Columns, at_ns: Time) -> tuple[Columns, NDArray[np.bool_]
         return replace(columns, time_ns=at_ns, data=np.zeros(len(at_ns), columns.data.dtype)), np.zeros(
             len(at_ns), bool
         )
+    if np.array_equal(stamps, at_ns):
+        return replace(columns, time_ns=at_ns, data=data), np.ones(len(at_ns), dtype=np.bool_)
     result = data[nearest(stamps, at_ns)].copy()
     _interpolate(columns.channel.type, stamps, data, at_ns, result)
     return replace(columns, time_ns=at_ns, data=result), covered(stamps, at_ns)

@@ -2,6 +2,8 @@
 
 import json
 import struct
+import subprocess
+import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -390,3 +392,44 @@ def test_real_files_of_other_writers_stay_byte_identical(name: str, logs: Path, 
         assert (log.profile, log.library) == (profile, library)
     with pytest.raises(InputError, match="no IMU"):
         attlog.estimate(path)
+
+
+def test_units_that_ros_does_not_have_are_pointed_out(flown: SimulatedRun, tmp_path: Path) -> None:
+    rows = _mag_rows(flown)[:100]
+    for _, row in rows:
+        row["magnetic_field"] = {axis: 1e6 * value for axis, value in row["magnetic_field"].items()}
+    path = write_ros2(tmp_path / "log.mcap", [("/mag", "sensor_msgs/msg/MagneticField", rows)])
+    with storage.open(path) as log:
+        told = "\n".join(load(log).remarks)
+    assert "cannot be tesla" in told
+
+
+def test_the_command_line_takes_bags(flown: SimulatedRun, tmp_path: Path) -> None:
+    bag = write_bag(
+        tmp_path / "bag",
+        [
+            ("/a/imu", "sensor_msgs/msg/Imu", _imu_rows(flown)),
+            ("/b/imu", "sensor_msgs/msg/Imu", _imu_rows(flown)),
+            ("/body/pose", "geometry_msgs/msg/PoseStamped", _pose_rows(flown)),
+        ],
+    )
+
+    def call(*words: str) -> "subprocess.CompletedProcess[str]":
+        program = str(Path(sys.executable).with_name("attlog"))
+        return subprocess.run([program, *words], cwd=tmp_path, capture_output=True, text=True, check=False)
+
+    refused = call("run", str(bag))
+    assert refused.returncode == 1
+    assert "--topic imu=/a/imu" in refused.stderr
+    assert call("estimate", "bag", "--topic", "imu=/c/imu").returncode == 2
+    assert call("run", "flight.tlog", "--topic", "imu=/a/imu").returncode != 0
+    done = call("run", str(bag), "-e", "ecf", "--topic", "imu=/a/imu", "--topic", "reference=/body/pose")
+    assert done.returncode == 0, done.stderr
+    assert "/body/pose is reference" in done.stdout
+    aligned = call("align", "bag", "--json")
+    assert aligned.returncode == 0, aligned.stderr
+    told = json.loads(aligned.stdout)[0]["alignment"]
+    assert told["clock"] == "/body/pose"
+    assert abs(told["offset_s"]) < 1e-3
+    analyzed = call("analyze", "bag")
+    assert "clock aligned: /body/pose" in analyzed.stdout
