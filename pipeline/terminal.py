@@ -1,5 +1,6 @@
 """What the command line shows and hears while it works: a status line, and the signals that end a recording."""
 
+import shutil
 import signal
 import sys
 from collections.abc import Iterator
@@ -17,6 +18,7 @@ class StatusLine:
     def show(self, text: str) -> None:
         """Put ``text`` in the place of what is there."""
         if self._shown:
+            text = text[: shutil.get_terminal_size().columns - 1]
             sys.stderr.write(f"\r{text.ljust(self._width)}")
             sys.stderr.flush()
             self._width = len(text)

@@ -345,6 +345,19 @@ def test_tcp_that_closes_is_opened_again(start: Start, tmp_path: Path) -> None:
     assert official(tmp_path / "imu.mcap")["/imu0/data_raw"] == 400
 
 
+def test_a_terminal_gets_a_status_line(tmp_path: Path) -> None:
+    screen, port = Terminal(), free_port()
+    command = [ATTLOG, "record", f"mavlink:udpin:127.0.0.1:{port}", "-o", "imu.mcap", "--duration", "4s"]
+    process = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=screen.slave)
+    while process.poll() is None:
+        send(imu_frames(100), port, 1000.0)
+    shown = os.read(screen.master, 1 << 16).decode()
+    screen.close()
+    assert "\r" in shown
+    assert "Hz" in shown
+    assert "imu.mcap" in shown
+
+
 def test_nothing_arrives_nothing_is_written(start: Start, tmp_path: Path) -> None:
     process = start(f"mavlink:udpin:127.0.0.1:{free_port()}", "-o", "none.mcap")
     code, out, err = stop(process)
