@@ -152,9 +152,14 @@ def _placed(
 
 
 def _in_words(about: Mapping[str, str]) -> str:
+    said = []
+    if "stamped_by" in about:
+        said.append("timed by log time")
     if "stamp_offset_ns" in about:
-        return f" (its stamps count from elsewhere: {int(about['stamp_offset_ns']) / 1e9:+.3f} s)"
-    return " (timed by log time)" if "stamped_by" in about else ""
+        said.append(f"its stamps count from elsewhere: {int(about['stamp_offset_ns']) / 1e9:+.3f} s")
+    if "stamps_replaced" in about:
+        said.append(f"{about['stamps_replaced']} stamps that cannot be replaced by the log time")
+    return f" ({'; '.join(said)})" if said else ""
 
 
 def _unit(

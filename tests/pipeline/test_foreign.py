@@ -357,6 +357,19 @@ def test_stamps_of_another_epoch_keep_their_spacing(flown: SimulatedRun, tmp_pat
     assert 0 <= int(found.time_ns[0] - flown.imu.time_ns[0]) - LATENCY_NS < 1_000_000
 
 
+def test_a_wild_stamp_does_not_move_the_others(flown: SimulatedRun, tmp_path: Path) -> None:
+    rows = _imu_rows(flown)[:200]
+    rows[50] = (rows[50][0], {**rows[50][1], "header": _header(10**18 * 2, "x")})
+    path = write_ros2(tmp_path / "log.mcap", [("/imu", "sensor_msgs/msg/Imu", rows)])
+    with storage.open(path) as log:
+        loaded = load(log)
+    stamps = loaded.vehicles[""].imu[0].time_ns
+    expected = flown.imu.time_ns[:200].copy()
+    expected[50] += LATENCY_NS
+    assert (stamps == expected).all()
+    assert "1 stamps that cannot be" in loaded.remarks[0]
+
+
 def test_foxgloves_json(flown: SimulatedRun, tmp_path: Path) -> None:
     truth = flown.reference
     rows: dict[str, list[Row]] = {"foxglove.PoseInFrame": [], "foxglove.FrameTransforms": []}
