@@ -107,6 +107,7 @@ class _Job:
         self.report = Recovery(bytes_total=file.size)
         self.chunks: dict[int, dict[int, Messages]] = {}
         self.profile = ""
+        self.past_data = False
         self.schemas: dict[int, SchemaRecord] = {}
         self.channels: dict[int, ChannelRecord] = {}
 
@@ -157,6 +158,10 @@ class _Job:
 
     def _copy(self, out: Rebuilt, stretch: Stretch) -> None:
         start, end = stretch.start, stretch.end
+        if self.past_data and stretch.what is not What.RECORD:
+            self.report.notes.append(f"byte {start:,}: the old summary is damaged; a new one was made")
+            return
+        self.past_data = self.past_data or (stretch.what is What.RECORD and stretch.op == Op.DATA_END)
         if stretch.what is What.GARBAGE:
             self.report.lose(NO_RECORD, start, end)
         elif stretch.what is What.TORN:

@@ -169,6 +169,13 @@ def test_definitions_come_from_the_summary_where_their_chunk_is_lost(tmp_path: P
     assert len(messages) > 300
 
 
+def test_a_cut_in_the_summary_loses_nothing(streamed: Path, tmp_path: Path) -> None:
+    report, messages = recovered(streamed.read_bytes()[:-200], tmp_path)
+    assert report.complete
+    assert not report.ended
+    assert len(messages) == BATCHES * BATCH
+
+
 def test_nothing_is_overwritten_and_nonsense_is_refused(streamed: Path, tmp_path: Path) -> None:
     source = tmp_path / "log.mcap"
     source.write_bytes(streamed.read_bytes()[:5000])
