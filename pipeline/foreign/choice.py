@@ -158,7 +158,7 @@ def _in_words(about: Mapping[str, str]) -> str:
     if "stamp_offset_ns" in about:
         said.append(f"its stamps count from elsewhere: {int(about['stamp_offset_ns']) / 1e9:+.3f} s")
     if "stamps_replaced" in about:
-        said.append(f"{about['stamps_replaced']} stamps that cannot be replaced by the log time")
+        said.append(f"{about['stamps_replaced']} of its stamps, hours from the others, replaced by the log time")
     return f" ({'; '.join(said)})" if said else ""
 
 
