@@ -1,6 +1,7 @@
 """An affine map from one clock to another, on the envelope of pairs of which one member comes late."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -74,10 +75,12 @@ def edge(x: Floats, y: Floats) -> tuple[float, float]:
 
 def _highest(x: Floats, y: Floats) -> tuple[Floats, Floats]:
     """The highest point of each of some equal spans of x, in order of x."""
-    span = (x * (BINS / (float(x.max()) + 1.0))).astype(np.int64)
-    order = np.lexsort((y, span))
-    last = np.flatnonzero(np.append(np.diff(span[order]) > 0, True))
-    chosen = order[last]
+    if np.any(x[1:] < x[:-1]):
+        order = np.argsort(x, kind="stable")
+        x, y = x[order], y[order]
+    edges = np.unique(np.searchsorted(x, np.linspace(0.0, x[-1], BINS + 1)[1:-1]))
+    parts = pairwise([0, *edges[(edges > 0) & (edges < len(x))].tolist(), len(x)])
+    chosen = [start + int(y[start:stop].argmax()) for start, stop in parts]
     return x[chosen], y[chosen]
 
 
