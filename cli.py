@@ -39,7 +39,9 @@ JSON = click.option("--json", "as_json", is_flag=True, help="Print JSON instead 
 COMMON = _options(OUTPUT, FORCE, JOBS, TIMEOUT, JSON)
 SOURCE = _options(
     click.option("--vehicle", help="System id whose topics get no prefix, or 'all' to prefix every vehicle's."),
-    click.option("--sensor", help="Profile of a sensor that logs raw counts, such as mpu9250."),
+    click.option(
+        "--sensor", help="What raw counts mean: mpu9250, or LSB/g, LSB/(deg/s), uT/LSB: accel=16384,gyro=131,mag=0.15"
+    ),
     click.option("--dialect", default="ardupilotmega", show_default=True, help="MAVLink dialect."),
     click.option("--columns", metavar="NAME,...", help="CSV: what the columns are, as in t_us,ax_g,ay_g,az_g,gx_dps,…"),
     click.option("--rate", type=float, metavar="HZ", help="CSV: fixed rate, in place of a column of times."),
@@ -85,6 +87,12 @@ ANALYZE = _options(
 )
 
 
+def _say(verbose: int, quiet: bool) -> None:
+    """How much goes to stderr."""
+    if verbose or quiet:
+        logging.getLogger().setLevel(logging.ERROR if quiet else (logging.INFO, logging.DEBUG)[min(verbose, 2) - 1])
+
+
 @click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
 @click.version_option(package_name="attlog")
 @click.option("-v", "--verbose", count=True, help="Say more on stderr (-vv: tracebacks).")
@@ -92,11 +100,11 @@ ANALYZE = _options(
 def cli(verbose: int, quiet: bool) -> None:
     """Turn flight and IMU logs into one reviewable MCAP, estimate the attitude, and tell how wrong each estimate is.
 
-    Every verb takes files, folders and globs; one bad log stops no other. Exit codes: 0 done, 1 nothing could be done,
-    2 wrong usage, 3 done but for bytes that were skipped or logs that failed, 130 interrupted.
+    Every verb takes files, folders, globs and - (stdin); one bad log stops no other. Exit codes: 0 done, 1 nothing could
+    be done, 2 wrong usage, 3 done but for bytes that were skipped or logs that failed, 130 interrupted.
     """
-    level = logging.ERROR if quiet else (logging.WARNING, logging.INFO, logging.DEBUG)[min(verbose, 2)]
-    logging.basicConfig(level=level, format="%(message)s", stream=sys.stderr)
+    logging.basicConfig(format="%(message)s", stream=sys.stderr)
+    _say(verbose, quiet)
 
 
 @cli.command()
@@ -108,7 +116,7 @@ def convert(logs: Sequence[str], jobs: int | None, timeout: float, as_json: bool
     from . import pipeline
 
     options = _with_csv(options) | {"vehicle": _vehicle(options["vehicle"])}
-    _show(pipeline.for_each(pipeline.convert, logs, jobs=jobs, timeout_s=timeout, **options), as_json)
+    _show(_each(pipeline.convert, logs, jobs=jobs, timeout_s=timeout, **options), as_json)
 
 
 @cli.command()
@@ -122,7 +130,7 @@ def estimate(
     from . import pipeline
 
     chosen = list(estimators) or None
-    _show(pipeline.for_each(pipeline.estimate, logs, chosen, jobs=jobs, timeout_s=timeout, **options), as_json)
+    _show(_each(pipeline.estimate, logs, chosen, jobs=jobs, timeout_s=timeout, **options), as_json)
 
 
 @cli.command()
@@ -147,7 +155,7 @@ def analyze(
 
     spans = [_span(text) for text in exclude]
     options |= {"exclude": spans, "force": force}
-    done = pipeline.for_each(pipeline.analyze, logs, jobs=jobs, timeout_s=timeout, **options)
+    done = _each(pipeline.analyze, logs, jobs=jobs, timeout_s=timeout, **options)
     if parquet is not None and done.results:
         ErrorTable.joined(result.table for result in done.results).to_parquet(parquet, force=force)
     _show(done, as_json)
@@ -173,7 +181,7 @@ def run(
 
     options = _with_csv(options) | {"vehicle": _vehicle(options["vehicle"])}
     options |= {"estimators": list(estimators) or None, "exclude": [_span(text) for text in exclude]}
-    _show(pipeline.for_each(pipeline.run, logs, jobs=jobs, timeout_s=timeout, **options), as_json)
+    _show(_each(pipeline.run, logs, jobs=jobs, timeout_s=timeout, **options), as_json)
 
 
 @cli.command()
@@ -185,7 +193,7 @@ def info(logs: Sequence[str], jobs: int | None, timeout: float, as_json: bool) -
     """Tell what is in MCAPs: topics, types, counts, rates, time span, source, completeness."""
     from . import pipeline
 
-    _show(pipeline.for_each(pipeline.info, logs, jobs=jobs or 1, timeout_s=timeout), as_json)
+    _show(_each(pipeline.info, logs, jobs=jobs or 1, timeout_s=timeout), as_json)
 
 
 @cli.command()
@@ -217,7 +225,7 @@ def annotate(
         raise click.UsageError('a note needs a log and a text: attlog annotate FILE --at 12.3s "text"')
     if list_only and (at is not None or options["notes"] or options["remove"]):
         raise click.UsageError("--list goes without --at, --notes and --remove")
-    _show(pipeline.for_each(pipeline.annotate, files, text, at=at, jobs=jobs, timeout_s=timeout, **options), as_json)
+    _show(_each(pipeline.annotate, files, text, at=at, jobs=jobs, timeout_s=timeout, **options), as_json)
 
 
 @cli.command()
@@ -236,7 +244,7 @@ def align(
     """Find and store how a reference's clock differs from the gyro's, in MCAPs."""
     from . import pipeline
 
-    _show(pipeline.for_each(pipeline.align, logs, reference, jobs=jobs, timeout_s=timeout, **options), as_json)
+    _show(_each(pipeline.align, logs, reference, jobs=jobs, timeout_s=timeout, **options), as_json)
 
 
 @cli.command()
@@ -255,7 +263,7 @@ def export(logs: Sequence[str], jobs: int | None, timeout: float, as_json: bool,
     """Write each channel of MCAPs to a Parquet or CSV file of its own."""
     from . import pipeline
 
-    _show(pipeline.for_each(pipeline.export, logs, jobs=jobs, timeout_s=timeout, **options), as_json)
+    _show(_each(pipeline.export, logs, jobs=jobs, timeout_s=timeout, **options), as_json)
 
 
 @cli.command()
@@ -329,7 +337,7 @@ def recover(logs: Sequence[str], jobs: int | None, timeout: float, as_json: bool
 
     options = _with_csv(options) | {"vehicle": _vehicle(options["vehicle"])}
     del options["compression"]
-    _show(pipeline.for_each(pipeline.recover, logs, jobs=jobs, timeout_s=timeout, **options), as_json)
+    _show(_each(pipeline.recover, logs, jobs=jobs, timeout_s=timeout, **options), as_json)
 
 
 @cli.command(name="list")
@@ -340,6 +348,15 @@ def list_(what: str, as_json: bool) -> None:
     from .pipeline.listing import listing
 
     _print(listing(what), as_json)
+
+
+def _each(call: Any, logs: Sequence[str], *args: Any, **options: Any) -> "Outcomes[Any]":
+    """Do every log, with a bar on a terminal unless it is to be quiet."""
+    from . import pipeline
+    from .pipeline.progress import bar
+
+    quiet = logging.getLogger().getEffectiveLevel() >= logging.ERROR
+    return pipeline.for_each(call, logs, *args, progress=None if quiet else bar, **options)
 
 
 def _vehicle(spelled: str | None) -> Any:

@@ -18,29 +18,41 @@ TIMEOUT_S = 3600.0
 _log = logging.getLogger("attlog")
 
 
-def run_all(tasks: Sequence[Task[T]], jobs: int | None = None, timeout_s: float = TIMEOUT_S) -> Outcomes[T]:
-    """Run every task, at most ``jobs`` at once (all cores by default); one that fails, dies or hangs stops no other."""
+def run_all(
+    tasks: Sequence[Task[T]],
+    jobs: int | None = None,
+    timeout_s: float = TIMEOUT_S,
+    done: Callable[[int], None] = lambda number: None,
+) -> Outcomes[T]:
+    """Run every task, at most ``jobs`` at once (all cores by default); one that fails, dies or hangs stops no other.
+
+    ``done`` is called with the number of each task that is finished.
+    """
     workers = min(jobs or os.cpu_count() or 1, len(tasks))
     if len(tasks) <= 1 or workers == 1:
-        return Outcomes(tuple(_here(name, call) for name, call in tasks))
-    return Outcomes(tuple(_in_pool(tasks, workers, timeout_s)))
+        return Outcomes(tuple(_here(number, name, call, done) for number, (name, call) in enumerate(tasks)))
+    return Outcomes(tuple(_in_pool(tasks, workers, timeout_s, done)))
 
 
-def _here(name: str, call: Callable[[], T]) -> Outcome[T]:
+def _here(number: int, name: str, call: Callable[[], T], done: Callable[[int], None]) -> Outcome[T]:
     try:
         return Outcome(name, call())
     except UsageError:
         raise
     except Exception as error:
         return Outcome(name, None, describe(name, error))
+    finally:
+        done(number)
 
 
-def _in_pool(tasks: Sequence[Task[T]], workers: int, timeout_s: float) -> list[Outcome[T]]:
+def _in_pool(tasks: Sequence[Task[T]], workers: int, timeout_s: float, done: Callable[[int], None]) -> list[Outcome[T]]:
     from pebble import ProcessPool
 
     pool: Any = ProcessPool(max_workers=workers, context=multiprocessing.get_context("spawn"))
     try:
         futures = [(name, pool.schedule(call, timeout=timeout_s)) for name, call in tasks]
+        for number, (_, future) in enumerate(futures):
+            future.add_done_callback(lambda _, number=number: done(number))
         outcomes = [_collect(name, future) for name, future in futures]
         pool.close()
     except BaseException:

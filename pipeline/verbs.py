@@ -1,17 +1,20 @@
 """What makes a call on one log a verb: given a list, it does every log, each on its own."""
 
 import functools
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import Any, Concatenate, Generic, ParamSpec, TypeVar, overload
 
 from .batch import TIMEOUT_S, run_all
 from .inputs import expand, outputs
 from .outcomes import Outcomes, Result
+from .stdin import without_stdin
 
 P = ParamSpec("P")
 T = TypeVar("T", bound=Result)
 Place = str | Path
+Progress = Callable[[Sequence[Path]], AbstractContextManager[Callable[[int], None]]]
 
 
 class Verb(Generic[P, T]):
@@ -74,16 +77,24 @@ def for_each(
     output: Place | None = None,
     jobs: int | None = None,
     timeout_s: float = TIMEOUT_S,
+    progress: Progress | None = None,
     **options: Any,
 ) -> Outcomes[T]:
-    """Do every log that ``sources`` (files, folders, globs) name, at most ``jobs`` at once, each at most ``timeout_s``.
+    """Do every log that ``sources`` (files, folders, globs, - for stdin) name, at most ``jobs`` at once.
 
     ``output`` is a folder, or a file where there is one log; ``args`` and ``options`` are those of ``call``. One log
-    that fails, dies or hangs stops no other.
+    that fails, dies or takes longer than ``timeout_s`` stops no other. ``progress`` is told which logs there are and
+    the number of each that is finished.
     """
-    files = expand(sources, call.accepts)
+    files = expand(without_stdin(sources, output is not None or not call.writes), call.accepts)
     tasks = [
         (str(file), functools.partial(call, file, *args, **target, **options))
         for file, target in zip(files, call.targets(files, output), strict=True)
     ]
-    return run_all(tasks, jobs, timeout_s)
+    with (progress or _untold)(files) as done:
+        return run_all(tasks, jobs, timeout_s, done)
+
+
+@contextmanager
+def _untold(_: Sequence[Path]) -> Iterator[Callable[[int], None]]:
+    yield lambda number: None

@@ -24,8 +24,26 @@ PROFILES: Mapping[str, SensorProfile] = {
 
 
 def profile(name: str) -> SensorProfile:
-    """The profile called ``name``; UsageError lists those that exist."""
+    """The profile called ``name``, or scales as in ``accel=16384,gyro=131,mag=0.15`` (LSB/g, LSB/(deg/s), uT/LSB)."""
+    if "=" in name:
+        return _scales(name)
     try:
         return PROFILES[name]
     except KeyError:
-        raise UsageError(f"no sensor profile {name!r}; there are: {', '.join(sorted(PROFILES))}") from None
+        known = ", ".join(sorted(PROFILES))
+        raise UsageError(f"no sensor profile {name!r}; there are: {known}; or give {_EXAMPLE}") from None
+
+
+_EXAMPLE = "scales, as accel=16384,gyro=131,mag=0.15 (LSB/g, LSB/(deg/s), uT/LSB)"
+
+
+def _scales(spelled: str) -> SensorProfile:
+    try:
+        given = {key.strip(): float(value) for key, _, value in (part.partition("=") for part in spelled.split(","))}
+        if set(given) - {"accel", "gyro", "mag"} or not {"accel", "gyro"} <= set(given):
+            raise ValueError
+        if not all(0 < value < float("inf") for value in given.values()):
+            raise ValueError
+    except ValueError:
+        raise UsageError(f"{spelled!r} are no scales of a sensor; write {_EXAMPLE}") from None
+    return SensorProfile(spelled, given["accel"], given["gyro"], given.get("mag", float("nan")))

@@ -225,6 +225,41 @@ def test_real_logs(attlog: Attlog, logs: Path, readcheck: Callable[[Path], None]
     readcheck(tmp_path / "out.mcap")
 
 
+def test_a_log_from_stdin(root: Path, tmp_path: Path, attlog: Attlog) -> None:
+    with (root / "data" / "demo_flight.tlog").open("rb") as log:
+        done = subprocess.run([ATTLOG, "convert", "-", "-o", "a.mcap"], cwd=tmp_path, stdin=log, check=False)
+    assert done.returncode == 0
+    assert attlog("convert", root / "data" / "demo_flight.tlog", "-o", "b.mcap").returncode == 0
+    assert _topics(tmp_path / "a.mcap") == _topics(tmp_path / "b.mcap")
+    with (tmp_path / "a.mcap").open("rb") as mcap:
+        told = subprocess.run([ATTLOG, "info", "-"], stdin=mcap, capture_output=True, check=False)
+    assert told.returncode == 0
+    assert b"/imu0/data_raw" in told.stdout
+    assert attlog("convert", "-").returncode == 2
+
+
+def test_a_terminal_sees_a_bar_and_a_pipe_does_not(root: Path, tmp_path: Path) -> None:
+    command = [ATTLOG, "convert", str(root / "data" / "demo_flight.tlog"), "-o", str(tmp_path / "a.mcap")]
+    screen, terminal = os.openpty()
+    try:
+        subprocess.run(command, stdout=subprocess.DEVNULL, stderr=terminal, check=True)
+    finally:
+        os.close(terminal)
+    shown = b""
+    while True:
+        try:
+            piece = os.read(screen, 65536)
+        except OSError:  # the last writer is gone
+            break
+        if not piece:
+            break
+        shown += piece
+    os.close(screen)
+    assert b"kB" in shown or b"MB" in shown
+    silent = subprocess.run([*command, "--force"], capture_output=True, check=True)
+    assert silent.stderr == b""
+
+
 def test_colour_and_width_do_not_change_what_a_pipe_gets(root: Path, tmp_path: Path, flight: Path) -> None:
     narrow = subprocess.run(
         [ATTLOG, "info", str(flight)], env={**os.environ, "COLUMNS": "20"}, capture_output=True, check=True

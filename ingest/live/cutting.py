@@ -78,7 +78,7 @@ def frames(data: Bytes, crc_extra: NDArray[np.int16]) -> tuple[Ints, Ints]:
     """The places of all right frames of a raw stream, and their keys (message, system, component)."""
     data = np.asarray(data).view()
     data.flags.writeable = False  # as the kernel is compiled
-    found, _, _ = framing._scan(data, crc_extra, False, scan_kernel.NO_STAMP)
+    found, _, _ = framing.scan(data, crc_extra, False, scan_kernel.NO_STAMP)
     return found[0], found[2]
 
 

@@ -88,7 +88,7 @@ def find(data: Bytes, dialect: Dialect) -> Frames:
     data = np.asarray(data).view()
     data.flags.writeable = False  # one compilation of the kernels for memory maps and for arrays
     stamped, reference = detect(data, dialect.crc_extra)
-    (places, raw_stamps, key_of_frame), kinds, runs = _scan(data, dialect.crc_extra, stamped, reference)
+    (places, raw_stamps, key_of_frame), kinds, runs = scan(data, dialect.crc_extra, stamped, reference)
     stamps, wrong = repair(raw_stamps, kinds) if stamped else (raw_stamps, 0)
     lost = int(np.count_nonzero(kinds == LOOSE)) if stamped else 0
     groups_of, keys, counts = _classify(key_of_frame)
@@ -99,7 +99,7 @@ def find(data: Bytes, dialect: Dialect) -> Frames:
     return Frames(stamped, stamps, groups_of, rows_of, own, groups, Damage(runs, torn, lost, wrong))
 
 
-def _scan(
+def scan(
     data: Bytes, crc_extra: NDArray[np.int16], stamped: bool, reference: int
 ) -> tuple[Ints, NDArray[np.uint8], Ints]:
     """What `scan_kernel.scan` finds, in tables that grow where frames are short or much is broken."""
@@ -160,7 +160,7 @@ def detect(data: Bytes, crc_extra: NDArray[np.int16]) -> tuple[bool, int]:
 
 
 def _places(data: Bytes, crc_extra: NDArray[np.int16]) -> Ints:
-    return np.asarray(_scan(data, crc_extra, False, scan_kernel.NO_STAMP)[0][0])
+    return np.asarray(scan(data, crc_extra, False, scan_kernel.NO_STAMP)[0][0])
 
 
 def repair(raw: Ints, kinds: NDArray[np.uint8]) -> tuple[Ints, int]:

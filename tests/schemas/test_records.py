@@ -50,3 +50,16 @@ def test_profiles() -> None:
     assert profile("mpu9250").accel_lsb_per_g == 16384
     with pytest.raises(UsageError, match="mpu9250"):
         profile("abacus")
+
+
+def test_scales() -> None:
+    given = profile("accel=2048,gyro=16.4,mag=0.3")
+    assert (given.accel_lsb_per_g, given.gyro_lsb_per_dps, given.mag_ut_per_lsb) == (2048.0, 16.4, 0.3)
+
+
+@pytest.mark.parametrize(
+    "spelled", ["accel=1", "accel=0,gyro=1", "accel=1,gyro=x", "accel=1,gyro=1,baro=1", "=", "accel=nan,gyro=1"]
+)
+def test_what_are_no_scales(spelled: str) -> None:
+    with pytest.raises(UsageError, match="accel="):
+        profile(spelled)
