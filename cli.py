@@ -100,8 +100,8 @@ def _say(verbose: int, quiet: bool) -> None:
 def cli(verbose: int, quiet: bool) -> None:
     """Turn flight and IMU logs into one reviewable MCAP, estimate the attitude, and tell how wrong each estimate is.
 
-    Every verb takes files, folders, globs and - (stdin); one bad log stops no other. Exit codes: 0 done, 1 nothing could
-    be done, 2 wrong usage, 3 done but for bytes that were skipped or logs that failed, 130 interrupted.
+    Every verb takes files, folders, globs and - (stdin); one bad log stops no other. Exit codes: 0 done, 1 nothing
+    could be done, 2 wrong usage, 3 done but for bytes that were skipped or logs that failed, 130 interrupted.
     """
     logging.basicConfig(format="%(message)s", stream=sys.stderr)
     _say(verbose, quiet)
