@@ -8,16 +8,16 @@ SOURCES := pyproject.toml $(shell git ls-files '*.py' 2>/dev/null | grep -v '^te
 
 $(BIN)/python:
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --upgrade pip
+	$(BIN)/python -m pip install -qq --upgrade pip
 
 $(VENV)/installed: $(BIN)/python $(SOURCES)
 	rm -rf build/lib
-	$(BIN)/python -m pip install --quiet .
+	$(BIN)/python -m pip install -qq .
 	touch $@
 
 $(VENV)/installed-dev: $(BIN)/python $(SOURCES)
 	rm -rf build/lib
-	$(BIN)/python -m pip install --quiet ".[dev]"
+	$(BIN)/python -m pip install -qq ".[dev]"
 	touch $@ $(VENV)/installed
 
 demo: $(VENV)/installed
@@ -36,12 +36,12 @@ lint: $(VENV)/installed-dev
 
 bench: $(BIN)/python
 	rm -rf build/lib
-	$(BIN)/python -m pip install --quiet ".[peers]"
+	$(BIN)/python -m pip install -qq ".[peers]"
 	$(BIN)/python -m benchmarks
 
 docs: $(BIN)/python
 	rm -rf build/lib
-	$(BIN)/python -m pip install --quiet ".[docs]"
+	$(BIN)/python -m pip install -qq ".[docs]"
 	$(BIN)/mkdocs build --strict
 
 clean:

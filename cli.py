@@ -221,6 +221,8 @@ def annotate(
     from . import pipeline
 
     files, text = (list(logs), None) if at is None else (list(logs[:-1]), logs[-1])
+    if text is not None and os.path.exists(text):
+        raise click.UsageError(f"{text} is a file: the last argument is the note's text")
     if not files:
         raise click.UsageError('a note needs a log and a text: attlog annotate FILE --at 12.3s "text"')
     if list_only and (at is not None or options["notes"] or options["remove"]):
@@ -355,6 +357,7 @@ def _each(call: Any, logs: Sequence[str], *args: Any, **options: Any) -> "Outcom
     from . import pipeline
     from .pipeline.progress import bar
 
+    options["jobs"] = options.get("jobs") or os.cpu_count() or 1
     quiet = logging.getLogger().getEffectiveLevel() >= logging.ERROR
     return pipeline.for_each(call, logs, *args, progress=None if quiet else bar, **options)
 
@@ -402,10 +405,18 @@ def _show(outcomes: "Outcomes[Any]", as_json: bool) -> None:
     if not outcomes:
         click.echo("attlog: no log found in what was named", err=True)
     if as_json:
-        click.echo(outcomes.to_json())
+        _say_result(outcomes.to_json())
     elif outcomes.results:
-        click.echo(outcomes.to_text())
+        _say_result(outcomes.to_text())
     sys.exit(outcomes.exit_code)
+
+
+def _say_result(text: str) -> None:
+    """Print; a reader that has gone away changes nothing of what was done."""
+    try:
+        click.echo(text)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def main() -> None:

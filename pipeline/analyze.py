@@ -11,7 +11,7 @@ from ..analysis.error import AttitudeError, Span, attitude_error
 from ..analysis.table import ErrorTable
 from ..schemas.clock import ClockAlignment
 from ..schemas.columns import Columns
-from ..schemas.errors import InputError
+from ..schemas.errors import InputError, UsageError
 from ..schemas.recording import Attitude, Recording
 from .inputs import in_place_target, is_mcap
 from .logs import load, open_log, shifted
@@ -19,6 +19,7 @@ from .own import OWN_TYPES
 from .provenance import software
 from .verbs import Place, verb
 
+LONGEST_S = 1e9
 TRUTH = "truth"
 ONBOARD = "onboard"
 PREFERRED_ONBOARD = ("att", "attitude", "vehicle_attitude")
@@ -53,6 +54,12 @@ class AnalysisOptions:
     start_s: float | None = None
     end_s: float | None = None
     exclude_s: tuple[tuple[float, float], ...] = ()
+
+    def __post_init__(self) -> None:
+        bounds = (-LONGEST_S if self.start_s is None else self.start_s, LONGEST_S if self.end_s is None else self.end_s)
+        for first, last in (bounds, *self.exclude_s):
+            if not -LONGEST_S <= first < last <= LONGEST_S:
+                raise UsageError(f"from {first:g} to {last:g} s is no span of time: seconds, the smaller first")
 
 
 def attitudes(recording: Recording) -> dict[str, Attitude]:
@@ -111,11 +118,15 @@ def errors_of(recording: Recording, options: AnalysisOptions, start_ns: int) -> 
         "exclude": _spans(options.exclude_s, start_ns),
         "alignment": options.alignment,
     }
-    return {
+    errors = {
         name: attitude_error(attitude, reference, **span)  # type: ignore[arg-type]
         for name, attitude in attitudes(recording).items()
         if name != reference_name
     }
+    if errors and not any(error.counts.counted for error in errors.values()):
+        first, last = ((int(at) - start_ns) / 1e9 for at in reference.time_ns[[0, -1]])
+        raise InputError(f"no sample counts in that span; {reference.topic} lasts from {first:.1f} to {last:.1f} s")
+    return errors
 
 
 def _at(after_s: float | None, start_ns: int) -> int | None:
@@ -196,7 +207,7 @@ def analyze(
     options = AnalysisOptions(reference, alignment, start, end, tuple(exclude))
     done, reasons = analyze_recordings(vehicles.values(), options, start_ns)
     if not done:
-        why = reasons or ["the log has only one attitude"]
+        why = reasons or ["the log has no two attitudes"]
         raise InputError(f"{path}: nothing to compare: {'; '.join([*why, *remarks])}")
     columns = [channel for each in done for channel in each.columns()]
     storage.annotate(path, columns, remove=gone.__contains__, metadata=loaded.metadata, output=target)

@@ -2,7 +2,7 @@
 
 import csv
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -96,10 +96,21 @@ def notes_from_csv(path: str | Path) -> list[NoteText]:
             for row in reader:
                 if not row["at"] or not row["text"]:
                     raise InputError(f"{path}, line {reader.line_num}: a note needs a time and a text")
+                _check_row(path, reader.line_num, row)
                 notes.append(NoteText(row["at"], row["text"], row.get("to") or None, row.get("severity") or "info"))
     except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise InputError(f"{path}: cannot be read as a CSV of notes: {error}") from error
+        why = getattr(error, "strerror", None) or error
+        raise InputError(f"{path}: cannot be read as a CSV of notes: {why}") from error
     return notes
+
+
+def _check_row(path: Place, line: int, row: Mapping[str, str]) -> None:
+    try:
+        severity_of(row.get("severity") or "info")
+        for spelled in filter(None, (row["at"], row.get("to"))):
+            moment_ns(spelled, 0)
+    except UsageError as error:
+        raise InputError(f"{path}, line {line}: {error}") from error
 
 
 def _dated(text: NoteText, start_ns: int) -> Note:
@@ -149,6 +160,10 @@ def annotate(
 def _wanted(text: str | None, at: str | None, to: str | None, severity: str, notes: Place | None) -> list[NoteText]:
     if (text is None) != (at is None):
         raise UsageError('a note needs both a text and a time: --at 12.3s "text"')
+    if to is not None and at is None:
+        raise UsageError("--to needs --at: a note begins before it ends")
+    if text is not None and not text.strip():
+        raise UsageError("the note's text is empty")
     severity_of(severity)
     single = [NoteText(at, text, to, severity)] if text is not None and at is not None else []
     return [*single, *(notes_from_csv(notes) if notes is not None else [])]
@@ -160,4 +175,6 @@ def _check(path: Path, own: list[Note], fresh: list[Note], remove: Sequence[int]
         raise InputError(f"{path}: there is no note {wrong[0]}; there are {len(own)} (attlog annotate {path} --list)")
     outside = [note for note in fresh if not span[0] <= note.time_ns <= span[1]]
     if outside:
-        raise InputError(f"{path}: {outside[0].text!r} is outside the log, which lasts {seconds(span[1] - span[0])}")
+        raise InputError(
+            f"{path}: the time of {outside[0].text!r} is outside the log, which lasts {seconds(span[1] - span[0])}"
+        )

@@ -2,7 +2,6 @@
 
 import logging
 import multiprocessing
-import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import TimeoutError as PoolTimeoutError
 from typing import Any, TypeVar
@@ -20,15 +19,15 @@ _log = logging.getLogger("attlog")
 
 def run_all(
     tasks: Sequence[Task[T]],
-    jobs: int | None = None,
+    jobs: int = 1,
     timeout_s: float = TIMEOUT_S,
     done: Callable[[int], None] = lambda number: None,
 ) -> Outcomes[T]:
-    """Run every task, at most ``jobs`` at once (all cores by default); one that fails, dies or hangs stops no other.
+    """Run every task, at most ``jobs`` at once; one that fails, dies or hangs stops no other.
 
     ``done`` is called with the number of each task that is finished.
     """
-    workers = min(jobs or os.cpu_count() or 1, len(tasks))
+    workers = min(jobs, len(tasks))
     if len(tasks) <= 1 or workers == 1:
         return Outcomes(tuple(_here(number, name, call, done) for number, (name, call) in enumerate(tasks)))
     return Outcomes(tuple(_in_pool(tasks, workers, timeout_s, done)))

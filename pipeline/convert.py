@@ -1,5 +1,6 @@
 """A log of any format to one MCAP."""
 
+from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -99,12 +100,13 @@ def segment_lines(segments: Iterable[Segment], start_ns: int) -> list[str]:
 
 
 def finding_lines(findings: Iterable[Finding], start_ns: int) -> list[str]:
-    """One line for each finding that is at least a warning."""
-    return [
+    """One line for each finding that is at least a warning; equal lines once, with how often."""
+    lines = Counter(
         f"{f.severity.name.lower()} at {seconds(f.time_ns - start_ns)}: {f.topic or 'log'}: {f.kind}: {f.advice}"
         for f in findings
         if f.severity >= 30
-    ]
+    )
+    return [line if times == 1 else f"{line} ({times} times)" for line, times in lines.items()]
 
 
 def ingest_options(

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from datetime import UTC, datetime
 
 from ..schemas import records
+from ..schemas.errors import UsageError
 from ..schemas.finding import Finding, Kind, Severity
 from ..schemas.recording import Declination, Fix, Recording
 
@@ -29,7 +30,11 @@ def with_declination(recording: Recording, stated_deg: float | None) -> tuple[Re
 
 
 def _stated(degrees: float | None) -> Declination | None:
-    return None if degrees is None else Declination(degrees, "stated")
+    if degrees is None:
+        return None
+    if not abs(degrees) <= 180.0:
+        raise UsageError(f"a declination of {degrees} degrees; it lies from -180 to 180, east positive")
+    return Declination(degrees, "stated")
 
 
 def _parameter(parameters: Mapping[str, str]) -> Declination | None:

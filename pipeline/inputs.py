@@ -1,6 +1,7 @@
 """Which files a call means, and where the result of each goes."""
 
 import glob
+import logging
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
@@ -9,6 +10,9 @@ from ..schemas.errors import InputError, StorageError, UsageError
 
 MCAP_MAGIC = b"\x89MCAP0\r\n"
 HEAD_BYTES = 65536
+LOG_SUFFIXES = frozenset({".bin", ".log", ".tlog", ".ulg", ".csv", ".mat", ".hdf5", ".mcap"})
+"""Files of a folder that are called so and are no logs are told; all others are left out in silence."""
+_log = logging.getLogger("attlog")
 
 
 def expand(sources: Iterable[str | Path], accepts: Callable[[Path], bool]) -> list[Path]:
@@ -17,6 +21,8 @@ def expand(sources: Iterable[str | Path], accepts: Callable[[Path], bool]) -> li
     matches nothing stays, to be reported."""
     found: dict[Path, None] = {}
     for source in sources:
+        if not str(source).strip():
+            raise UsageError("one of the names is empty; is a variable not set?")
         for place in _matches(str(source)):
             members = _members(place, accepts) if place.is_dir() else [place]
             found.update(dict.fromkeys(members))
@@ -33,11 +39,16 @@ def _members(folder: Path, accepts: Callable[[Path], bool]) -> list[Path]:
     if accepts(folder):
         return [folder]
     found: list[Path] = []
+    left_out: list[str] = []
     for path in _visible(folder):
         if path.is_dir() and not path.is_symlink():
             found += _members(path, accepts)
         elif path.is_file() and accepts(path):
             found.append(path)
+        elif path.is_file() and path.suffix.lower() in LOG_SUFFIXES and not is_mcap(path):
+            left_out.append(path.name)
+    if left_out:
+        _log.warning("%s: left out, of no format that is read: %s", folder, ", ".join(left_out))
     return found
 
 
@@ -51,6 +62,8 @@ def _visible(folder: Path) -> list[Path]:
 def head_of(path: Path) -> bytes:
     """The first bytes of a file, as formats are recognised by; InputError where it cannot be read."""
     try:
+        if path.exists() and not (path.is_file() or path.is_dir()):
+            raise InputError(f"{path}: is no regular file; give what comes out of it on stdin, as -")
         with path.open("rb") as file:
             return file.read(HEAD_BYTES)
     except OSError as error:

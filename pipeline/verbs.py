@@ -75,7 +75,7 @@ def for_each(
     sources: Iterable[Place],
     *args: Any,
     output: Place | None = None,
-    jobs: int | None = None,
+    jobs: int = 1,
     timeout_s: float = TIMEOUT_S,
     progress: Progress | None = None,
     **options: Any,
@@ -83,8 +83,9 @@ def for_each(
     """Do every log that ``sources`` (files, folders, globs, - for stdin) name, at most ``jobs`` at once.
 
     ``output`` is a folder, or a file where there is one log; ``args`` and ``options`` are those of ``call``. One log
-    that fails, dies or takes longer than ``timeout_s`` stops no other. ``progress`` is told which logs there are and
-    the number of each that is finished.
+    that fails stops no other; with more than one job, neither does one that dies or takes longer than ``timeout_s``,
+    and a script that calls this needs the guard ``if __name__ == "__main__":``, since workers import it. ``progress``
+    is told which logs there are and the number of each that is finished.
     """
     files = expand(without_stdin(sources, output is not None or not call.writes), call.accepts)
     tasks = [

@@ -11,9 +11,11 @@ from .chunks_in import ChunkReader, Messages, Records
 from .chunks_out import ChunkWriter
 from .compression import codecs
 from .contents import Contents, write_end, write_metadata
+from .crc import crc32
 from .filter import without
+from .index import DATA_END_SIZE
 from .logfile import LogFile
-from .records import MAGIC, AttachmentIndex, ChunkIndex, MetadataIndex, Op
+from .records import MAGIC, AttachmentIndex, ChunkIndex, Cursor, MetadataIndex, Op, damaged
 from .sink import Sink, replacing
 from .writer import add_channels, check, compression_name
 
@@ -46,6 +48,7 @@ def annotate(
     check(channels)
     same = output is None or _same_file(source, Path(output))
     with LogFile(source) as log, replacing(source if output is None else Path(output), force or same) as sink:
+        _check_data(log)
         job = _Job(log, sink, {entry.channel.topic for entry in channels}, remove, metadata or {})
         job.copy()
         name = _compression(log) if compression is None else compression_name(compression)
@@ -58,6 +61,21 @@ def annotate(
         if same and not log.file.is_current():
             raise StorageError(f"{path}: another program changed the file meanwhile; nothing was written, run it again")
         log.close()  # some systems do not rename over an open file
+
+
+def _check_data(log: LogFile) -> None:
+    """InputError where the CRC over all that is copied is wrong: a rewrite would hide the damage."""
+    end = log.index.data_end
+    tail = Cursor(log.file.read(end, DATA_END_SIZE), log.path, end)
+    tail.head()
+    (stored,) = tail.numbers("I")
+    if not stored:
+        return
+    found = 0
+    for start in range(0, end, COPY_SIZE):
+        found = crc32(log.file.view(start, min(COPY_SIZE, end - start)), found)
+    if found != stored:
+        raise damaged(log.path, end, "the CRC of the data section is wrong")
 
 
 def _same_file(one: Path, other: Path) -> bool:

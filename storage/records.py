@@ -183,7 +183,9 @@ def metadata_record(name: str, entries: Mapping[str, str]) -> bytes:
 
 def damaged(path: Path, offset: int, what: str) -> InputError:
     """The one error for a file that is not as the format says."""
-    return InputError(f"{path}: byte {offset}: {what}; the file is damaged: get another copy or make it again")
+    return InputError(
+        f"{path}: byte {offset}: {what}; the file is damaged: `attlog recover {path}` saves what is sound"
+    )
 
 
 class Cursor:

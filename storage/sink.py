@@ -40,6 +40,8 @@ def replacing(path: Path, force: bool) -> Iterator[Sink]:
         raise StorageError(f"{path}: exists already; choose another name, or overwrite it with --force (force=True)")
     if target.is_dir():
         raise StorageError(f"{path}: is a directory; give the name of a file")
+    if target.exists() and not target.is_file():
+        raise StorageError(f"{path}: is no regular file, and is not replaced; give another name")
     beside = target.with_name(f".attlog-{os.getpid()}-{secrets.token_hex(4)}.part")
     _remove_leftovers(target.parent)
     try:

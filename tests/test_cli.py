@@ -269,3 +269,42 @@ def test_colour_and_width_do_not_change_what_a_pipe_gets(root: Path, tmp_path: P
     )
     assert narrow.stdout == plain.stdout
     assert b"\x1b[" not in plain.stdout
+
+
+@pytest.mark.parametrize(
+    "span", [["--start", "nan"], ["--end", "inf"], ["--start", "5", "--end", "2"], ["--exclude", "5:1"]]
+)
+def test_what_is_no_span_is_wrong_usage(attlog: Attlog, flight: Path, span: list[str]) -> None:
+    done = attlog("analyze", flight, *span)
+    assert done.returncode == 2
+    assert "seconds" in done.stderr
+
+
+def test_a_span_without_samples_is_told(attlog: Attlog, flight: Path) -> None:
+    done = attlog("analyze", flight, "--start", "1000", "--json")
+    assert done.returncode == 1
+    assert "lasts from 0.0 to 95.0 s" in done.stderr
+    assert json.loads(done.stdout)[0]["error"]
+
+
+@pytest.mark.parametrize("degrees", ["nan", "inf", "-400"])
+def test_a_declination_that_is_none_changes_nothing(attlog: Attlog, flight: Path, degrees: str) -> None:
+    before = flight.read_bytes()
+    assert attlog("estimate", flight, "--declination", degrees).returncode == 2
+    assert flight.read_bytes() == before
+
+
+def test_a_device_is_not_replaced(attlog: Attlog, root: Path, tmp_path: Path) -> None:
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    done = attlog("convert", root / "data" / "demo_flight.tlog", "-o", pipe, "--force")
+    assert done.returncode == 1
+    assert "no regular file" in done.stderr
+    assert pipe.is_fifo()
+    assert attlog("convert", pipe).returncode == 1
+
+
+def test_a_forgotten_text_is_told(attlog: Attlog, flight: Path) -> None:
+    done = attlog("annotate", flight, flight, "--at", "1s")
+    assert done.returncode == 2
+    assert "text" in done.stderr

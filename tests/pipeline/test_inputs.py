@@ -63,3 +63,19 @@ def test_an_output_that_exists_is_safe(tmp_path: Path) -> None:
     check_target(target, source, force=True)
     with pytest.raises(StorageError, match="source itself"):
         check_target(source, source, force=True)
+
+
+def test_an_empty_name_is_no_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    _touch(tmp_path, "a.mcap")
+    monkeypatch.chdir(tmp_path)
+    for nothing in ("", " "):
+        with pytest.raises(UsageError, match="empty"):
+            expand([nothing], is_mcap)
+
+
+def test_a_log_that_is_left_out_of_a_folder_is_told(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    (a,) = _touch(tmp_path, "a.mcap")
+    _touch(tmp_path, "readme.txt", "torn.tlog")
+    assert expand([tmp_path], is_mcap) == [a]
+    assert "torn.tlog" in caplog.text
+    assert "readme" not in caplog.text

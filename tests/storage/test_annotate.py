@@ -214,6 +214,10 @@ def test_chunks_of_unknown_compression_are_copied(log: Path) -> None:
     start = int.from_bytes(data[-28:-20], "little")
     checksum = crc.crc32(data[start:-12]).to_bytes(4, "little")
     log.write_bytes(data[:-12] + checksum + data[-8:])
+    with pytest.raises(InputError, match="data section"):
+        storage.annotate(log, [attitude("/a")])
+    unchecked = data[: start - 4] + bytes(4) + data[start:-12]  # a writer that gives the data section no CRC
+    log.write_bytes(unchecked + checksum + data[-8:])
     storage.annotate(log, [attitude("/a")])
     with storage.open(log) as opened:
         assert opened.topics["/imu0/data_raw"].count == 5000
