@@ -13,13 +13,14 @@ HEAD_BYTES = 65536
 
 @dataclass(frozen=True)
 class Format:
-    """A format: what it is, and the module of this room that recognises and reads it.
+    """A format: what it is, what is read from it, and the module of this room that recognises and reads it.
 
     A log is a file; where it is a ``folder`` of several, the module tells with ``members`` which of them it reads.
     """
 
     name: str
     summary: str
+    reads: str
     module: str
     folder: bool = False
 
@@ -46,14 +47,53 @@ class Format:
 FORMATS: Mapping[str, Format] = {
     form.name: form
     for form in (
-        Format("dataflash", "ArduPilot DataFlash log, binary (.bin) or text (.log)", "dataflash"),
-        Format("ulog", "PX4 ULog (.ulg)", "ulog"),
-        Format("mavlink", "MAVLink telemetry log (.tlog) or raw MAVLink 1 and 2 stream", "mavlink"),
-        Format("broad", "BROAD trial (.mat, .hdf5)", "datasets.broad"),
-        Format("repoimu", "RepoIMU trial (.csv)", "datasets.repoimu"),
-        Format("euroc", "EuRoC or TUM-VI sequence (folder)", "datasets.euroc", folder=True),
+        Format(
+            "dataflash",
+            "ArduPilot DataFlash log, binary (.bin) or text (.log)",
+            "IMU or ACC and GYR, MAG, GPS, SIM (truth), ATT, XKQ, XKF1, NKF1, AHR2, DCM, PARM, MSG, MODE, EV, ERR; "
+            "every message",
+            "dataflash",
+        ),
+        Format(
+            "ulog",
+            "PX4 ULog (.ulg)",
+            "sensor_combined, vehicle_imu, sensor_accel/gyro/mag, vehicle_magnetometer, vehicle_attitude, "
+            "estimator_attitude, groundtruth, GPS, parameters, events; every topic",
+            "ulog",
+        ),
+        Format(
+            "mavlink",
+            "MAVLink telemetry log (.tlog) or raw MAVLink 1 and 2 stream",
+            "RAW_IMU, SCALED_IMU/2/3, HIGHRES_IMU, HIL_STATE_QUATERNION, SIM_STATE, SIMSTATE (truth), ATTITUDE, "
+            "ATTITUDE_QUATERNION, AHRS2, GPS, PARAM_VALUE, STATUSTEXT; every message",
+            "mavlink",
+        ),
+        Format(
+            "broad",
+            "BROAD trial (.mat, .hdf5)",
+            "IMU, magnetometer, motion capture as the truth",
+            "datasets.broad",
+        ),
+        Format(
+            "repoimu",
+            "RepoIMU trial (.csv)",
+            "IMU, magnetometer, Vicon as the truth",
+            "datasets.repoimu",
+        ),
+        Format(
+            "euroc",
+            "EuRoC or TUM-VI sequence (folder)",
+            "IMU, ground truth",
+            "datasets.euroc",
+            folder=True,
+        ),
         # The least certain comes last.
-        Format("csv", "CSV or other table of numbers (Arduino, ESP32, x-IMU, …)", "serial_csv"),
+        Format(
+            "csv",
+            "CSV or other table of numbers (Arduino, ESP32, x-IMU, …)",
+            "gyroscope, accelerometer, magnetometer, attitude; every column",
+            "serial_csv",
+        ),
     )
 }
 

@@ -37,7 +37,11 @@ def _estimators() -> dict[str, str]:
 def _formats() -> dict[str, str]:
     from .. import ingest
 
-    return {form.name: form.summary for form in ingest.FORMATS.values()}
+    found = {form.name: f"{form.summary}: {form.reads}" for form in ingest.FORMATS.values()}
+    others = (
+        "MCAP or ROS 2 bag of any writer: Imu, MagneticField, NavSatFix, poses, odometry, TF; estimate, analyze, run"
+    )
+    return found | {"mcap": f"{others} take it as it is"}
 
 
 def _scenarios() -> dict[str, str]:
