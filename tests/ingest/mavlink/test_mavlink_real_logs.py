@@ -18,7 +18,9 @@ def both(request: pytest.FixtureRequest, logs: Path) -> tuple[Ingested, list[Any
     """A log as attlog and as pymavlink read it."""
     path = logs / f"{request.param}.tlog"
     connection = mavutil.mavlink_connection(str(path), dialect="ardupilotmega", robust_parsing=True)
-    return mavlink.read(Source.from_path(path), IngestOptions()), list(iter(connection.recv_match, None))
+    messages = list(iter(connection.recv_match, None))
+    connection.f.close()
+    return mavlink.read(Source.from_path(path), IngestOptions()), messages
 
 
 def test_every_message_and_field_equals_pymavlinks(both: tuple[Ingested, list[Any]]) -> None:

@@ -73,6 +73,7 @@ def files(draw: st.DrawFn) -> Printed:
     return Printed(mark + text.encode("latin-1"), columns, has_header, stamps_ns, values, junk)
 
 
+@pytest.mark.filterwarnings("default::pytest.PytestUnraisableExceptionWarning")  # what other tests left open
 @pytest.mark.filterwarnings("error")
 @settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(files())
